@@ -838,85 +838,20 @@ impl Modal {
             drive_to_modal: DVector::zeros(states),
         };
         // The part of the drive in the momentum: (M^-1 - 1) h u.
-        let slip = self.cavity.dot(&self.drive_rate);
+        let slip = self.slip();
         let share = m / (1.0 + m * self.cavity.norm_squared());
         for i in 0..n {
             expansion.drive_to_modal[n + i] = -share * self.cavity[i] * slip;
         }
-        // One or two poles, and the weights `kappa` with which their coordinates make `x`.
         let mut add = |poles: &[(&Pole, Complex64)], oscillator: Oscillator| {
             let k = 2 * sections.len();
-            let sum = |of: &dyn Fn(&Pole) -> Complex64| {
-                let [x, v] = [0, 1].map(|power| {
-                    (poles.iter())
-                        .map(|(pole, kappa)| kappa * pole.lambda.powi(power) * of(pole))
-                        .sum::<Complex64>()
-                        .re
-                });
-                [x, v]
-            };
-            let along = |pole: &Pole, with: &DVector<f64>| dot(&pole.left.as_slice()[..n], with.as_slice());
-            let of_states = |pole: &Pole, with: &[f64]| dot(&pole.left.as_slice()[n..], with);
-            let d = sum(&|pole| {
-                let of_structure = along(pole, &self.drive) + pole.lambda * along(pole, &self.drive_rate);
-                of_structure + of_states(pole, self.beside.drive.as_slice())
-            });
-            let kick = sum(&|pole| along(pole, &self.cavity));
-            for i in 0..n {
-                let eta = sum(&|pole| {
-                    let of_structure = pole.lambda * (pole.left[i] + m * self.cavity[i] * along(pole, &self.cavity))
-                        + along(pole, &self.damping.column(i).into_owned());
-                    of_structure + of_states(pole, self.beside.velocity.column(i).as_slice())
-                });
-                let p = sum(&|pole| pole.left[i] + m * self.cavity[i] * along(pole, &self.cavity));
-                for row in 0..2 {
-                    expansion.to_sections[(k + row, i)] = eta[row];
-                    expansion.to_sections[(k + row, n + i)] = p[row];
-                }
-            }
-            for i in 0..beside {
-                let z = sum(&|pole| pole.left[n + i]);
-                (expansion.to_sections.fixed_view_mut::<2, 1>(k, 2 * n + i)).copy_from_slice(&z);
-            }
-            let carried = sum(&|pole| m * along(pole, &self.cavity) * slip);
-            // The coordinates `kappa z` of the poles from `(x, v)`: `z1 + z2 = x`, `lambda1 z1 + lambda2 z2 = v`.
-            let inverse: Vec<[Complex64; 2]> = match *poles {
-                [(one, kappa_one), (two, kappa_two)] => {
-                    let apart = one.lambda - two.lambda;
-                    vec![
-                        [-two.lambda / apart / kappa_one, apart.inv() / kappa_one],
-                        [one.lambda / apart / kappa_two, -apart.inv() / kappa_two],
-                    ]
-                }
-                _ => poles.iter().map(|(_, kappa)| [kappa.inv(), Complex64::ZERO]).collect(),
-            };
-            for column in 0..2 {
-                expansion.drive_to_sections[k + column] = carried[column];
-                let part = |i: usize, power: i32| {
-                    let of = |((pole, _), inverse): (&(&Pole, Complex64), &[Complex64; 2])| {
-                        let part = pole.vector[i] / pole.norm * inverse[column];
-                        if power == 0 { part } else { pole.lambda * part }
-                    };
-                    poles.iter().zip(&inverse).map(of).sum::<Complex64>().re
-                };
-                for i in 0..n {
-                    expansion.to_modal[(i, k + column)] = part(i, 0);
-                    expansion.to_modal[(n + i, k + column)] = part(i, 1);
-                }
-                for i in 0..beside {
-                    expansion.to_modal[(2 * n + i, k + column)] = part(n + i, 0);
-                }
-            }
-            let row = |column: usize| {
-                (0..n)
-                    .map(|i| self.cavity[i] * expansion.to_modal[(i, k + column)])
-                    .sum::<f64>()
-            };
+            let [drive, kick] = self.enter_section(&mut expansion, k, poles, m);
+            let cavity = self.leave_section(&mut expansion, k, poles);
             sections.push(Section {
                 oscillator,
-                drive: [d[1] + 2.0 * oscillator.delta * d[0], d[0]],
+                drive: [drive[1] + 2.0 * oscillator.delta * drive[0], drive[0]],
                 kick,
-                cavity: [row(0), row(1)],
+                cavity,
             });
         };
         for pole in &pairs {
@@ -946,6 +881,95 @@ impl Modal {
             add(&[(lone, (self.reference(&lone.left) * a).inv())], oscillator);
         }
         Ok((sections, expansion))
+    }
+
+    /// The velocity of the cavity that a drive of 1 puts into the momenta.
+    fn slip(&self) -> f64 {
+        self.cavity.dot(&self.drive_rate)
+    }
+
+    /// The rows `k` and `k + 1` of the way to the sections, for one or two poles with the weights `kappa` with which their coordinates make `x`. What a
+    /// drive of 1 and an impulse of 1 at the cavity change of `(x, v)`.
+    fn enter_section(
+        &self,
+        expansion: &mut Expansion,
+        k: usize,
+        poles: &[(&Pole, Complex64)],
+        m: f64,
+    ) -> [[f64; 2]; 2] {
+        let (n, beside) = (self.stiffness.len(), self.beside.count());
+        let sum = |of: &dyn Fn(&Pole) -> Complex64| {
+            let [x, v] = [0, 1].map(|power| {
+                (poles.iter())
+                    .map(|(pole, kappa)| kappa * pole.lambda.powi(power) * of(pole))
+                    .sum::<Complex64>()
+                    .re
+            });
+            [x, v]
+        };
+        let along = |pole: &Pole, with: &DVector<f64>| dot(&pole.left.as_slice()[..n], with.as_slice());
+        let of_states = |pole: &Pole, with: &[f64]| dot(&pole.left.as_slice()[n..], with);
+        for i in 0..n {
+            let eta = sum(&|pole| {
+                let of_structure = pole.lambda * (pole.left[i] + m * self.cavity[i] * along(pole, &self.cavity))
+                    + along(pole, &self.damping.column(i).into_owned());
+                of_structure + of_states(pole, self.beside.velocity.column(i).as_slice())
+            });
+            let p = sum(&|pole| pole.left[i] + m * self.cavity[i] * along(pole, &self.cavity));
+            for row in 0..2 {
+                expansion.to_sections[(k + row, i)] = eta[row];
+                expansion.to_sections[(k + row, n + i)] = p[row];
+            }
+        }
+        for i in 0..beside {
+            let z = sum(&|pole| pole.left[n + i]);
+            (expansion.to_sections.fixed_view_mut::<2, 1>(k, 2 * n + i)).copy_from_slice(&z);
+        }
+        let slip = self.slip();
+        let carried = sum(&|pole| m * along(pole, &self.cavity) * slip);
+        (expansion.drive_to_sections.fixed_view_mut::<2, 1>(k, 0)).copy_from_slice(&carried);
+        let drive = sum(&|pole| {
+            let of_structure = along(pole, &self.drive) + pole.lambda * along(pole, &self.drive_rate);
+            of_structure + of_states(pole, self.beside.drive.as_slice())
+        });
+        [drive, sum(&|pole| along(pole, &self.cavity))]
+    }
+
+    /// The columns `k` and `k + 1` of the way back, for these poles and weights. The displacement of the cavity for `x` and `v` of 1.
+    fn leave_section(&self, expansion: &mut Expansion, k: usize, poles: &[(&Pole, Complex64)]) -> [f64; 2] {
+        let (n, beside) = (self.stiffness.len(), self.beside.count());
+        // The coordinates `kappa z` of the poles from `(x, v)`: `z1 + z2 = x`, `lambda1 z1 + lambda2 z2 = v`.
+        let inverse: Vec<[Complex64; 2]> = match *poles {
+            [(one, kappa_one), (two, kappa_two)] => {
+                let apart = one.lambda - two.lambda;
+                vec![
+                    [-two.lambda / apart / kappa_one, apart.inv() / kappa_one],
+                    [one.lambda / apart / kappa_two, -apart.inv() / kappa_two],
+                ]
+            }
+            _ => poles.iter().map(|(_, kappa)| [kappa.inv(), Complex64::ZERO]).collect(),
+        };
+        for column in 0..2 {
+            let part = |i: usize, power: i32| {
+                let of = |((pole, _), inverse): (&(&Pole, Complex64), &[Complex64; 2])| {
+                    let part = pole.vector[i] / pole.norm * inverse[column];
+                    if power == 0 { part } else { pole.lambda * part }
+                };
+                poles.iter().zip(&inverse).map(of).sum::<Complex64>().re
+            };
+            for i in 0..n {
+                expansion.to_modal[(i, k + column)] = part(i, 0);
+                expansion.to_modal[(n + i, k + column)] = part(i, 1);
+            }
+            for i in 0..beside {
+                expansion.to_modal[(2 * n + i, k + column)] = part(n + i, 0);
+            }
+        }
+        [0, 1].map(|column| {
+            (0..n)
+                .map(|i| self.cavity[i] * expansion.to_modal[(i, k + column)])
+                .sum::<f64>()
+        })
     }
 
     /// What a mode is scaled by: its shape at the cavity, or its largest entry where the cavity is at a node.

@@ -202,6 +202,7 @@ const LARGEST: [f64; 2] = [0.1, 0.05];
 
 /// Draws a rig with hidden effects, or with none, and counts whether it is flagged, named, misnamed, and named among others. The ratio is the
 /// error of the strength over its standard uncertainty. `None` where the effects hardly move the points of the rig.
+#[expect(clippy::too_many_lines, reason = "a study")]
 fn named(hidden: &[Effect], uniform: Uniform, snr: &str) -> Result<Option<Found>, Failure> {
     let ratios @ [epsilon, _, r] = drawn(uniform);
     let mut scales = SCALES.map(|range| uniform(-range, range));

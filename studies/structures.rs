@@ -225,6 +225,7 @@ fn orbits_in_words(scene: &Scene) -> String {
     words + &format!("\n  {:?}", scene.structure.as_ref().map(|structure| &structure.modes))
 }
 
+#[expect(clippy::too_many_lines, reason = "a study")]
 fn main() -> Result<(), Failure> {
     let given: Vec<String> = std::env::args().skip(1).collect();
     let [count, seed, only @ ..] = &given[..] else {

@@ -145,6 +145,25 @@ pub struct Channels {
     measured: bool,
 }
 
+impl Channels {
+    /// What velocity and acceleration of the base show of a change of the drive, the delay later, m.
+    fn shown_by_base(&mut self, config: &Config, drive: PresentDrive, turn: Real) -> Real {
+        let rise = drive.amplitude - self.last;
+        self.showing += turn;
+        if self.showing > drive.omega * config.delay {
+            self.shown *= larger(1.0 - turn / PAUSE, 0.0);
+        }
+        if rise != 0.0 || self.rise != 0.0 {
+            let shown = (2.0 * rise.abs() + (rise - self.rise).abs() / turn) / turn;
+            if shown > self.shown {
+                (self.shown, self.showing) = (shown, 0.0);
+            }
+        }
+        (self.last, self.rise) = (drive.amplitude, rise);
+        self.shown
+    }
+}
+
 /// Measurements of a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Measurement {
@@ -177,52 +196,10 @@ impl Sensing {
     pub fn measure(&self, config: &Config, state: &mut Channels, input: &Input, drive: PresentDrive) -> Measurement {
         let base = input.reference.filter(|_| config.reference_connected);
         let fault = Self::fault(config, input.response, base);
-        let turn = drive.omega * config.sample_time;
         // The detectors ignore an invalid reading and keep their estimates.
         let is_read = fault != Some(Fault::Sensor);
         if is_read {
-            let rotors = self.detector.rotors(drive.rotor);
-            let take = |channel: &mut Channel, reading: Real, change: Option<Real>, [own, shown]: [Real; 2]| {
-                let limits = config.residual_max.map(|share| [share, own, shown]);
-                channel.take(&self.detector, limits, reading, &rotors, turn, change);
-            };
-            // The base follows the drive at once; the response grows, and its detector lags.
-            let is_known = state.closed > self.warm_up;
-            let change = if state.drive > 0.0 {
-                drive.amplitude / state.drive
-            } else {
-                1.0
-            };
-            let impact = state.balance.impact();
-            take(
-                &mut state.response,
-                input.response,
-                is_known.then_some(1.0),
-                [impact, 0.0],
-            );
-            if let Some(reading) = base {
-                // What velocity and acceleration of the base show of a change, the delay later.
-                let rise = drive.amplitude - state.last;
-                state.showing += turn;
-                if state.showing > drive.omega * config.delay {
-                    state.shown *= larger(1.0 - turn / PAUSE, 0.0);
-                }
-                if rise != 0.0 || state.rise != 0.0 {
-                    let shown = (2.0 * rise.abs() + (rise - state.rise).abs() / turn) / turn;
-                    if shown > state.shown {
-                        (state.shown, state.showing) = (shown, 0.0);
-                    }
-                }
-                (state.last, state.rise) = (drive.amplitude, rise);
-                let shown = state.shown;
-                let limits = if is_known { [0.0, shown] } else { [shown, 0.0] };
-                take(&mut state.base, reading, Some(change), limits);
-                if drive.amplitude == 0.0 {
-                    // A base without a drive rests.
-                    state.base.unchanged = 0.0;
-                }
-            }
-            state.drive += self.detector.step * (drive.amplitude - state.drive);
+            self.read(config, state, input.response, base, drive);
         }
         let (reference, reference_amplitude) = if base.is_some() {
             (state.base.estimate.fundamental(), state.base.estimate.amplitude)
@@ -250,7 +227,7 @@ impl Sensing {
             && (base.is_none() || state.base.estimate.is_coherent(config.lock.coherence_min));
         let powers = Powers {
             reading: if is_read { input.response } else { 0.0 },
-            turn,
+            turn: drive.omega * config.sample_time,
             drive: drive.amplitude,
             lagging: state.drive,
             base: if base.is_some() {
@@ -275,6 +252,35 @@ impl Sensing {
             valid: measurable && is_large && is_coherent,
             has_sensor: base.is_some(),
         }
+    }
+
+    /// Gives valid readings of response and base, m, to the detectors.
+    fn read(&self, config: &Config, state: &mut Channels, response: Real, base: Option<Real>, drive: PresentDrive) {
+        let turn = drive.omega * config.sample_time;
+        let rotors = self.detector.rotors(drive.rotor);
+        let take = |channel: &mut Channel, reading: Real, change: Option<Real>, [own, shown]: [Real; 2]| {
+            let limits = config.residual_max.map(|share| [share, own, shown]);
+            channel.take(&self.detector, limits, reading, &rotors, turn, change);
+        };
+        // The base follows the drive at once; the response grows, and its detector lags.
+        let is_known = state.closed > self.warm_up;
+        let change = if state.drive > 0.0 {
+            drive.amplitude / state.drive
+        } else {
+            1.0
+        };
+        let impact = state.balance.impact();
+        take(&mut state.response, response, is_known.then_some(1.0), [impact, 0.0]);
+        if let Some(reading) = base {
+            let shown = state.shown_by_base(config, drive, turn);
+            let limits = if is_known { [0.0, shown] } else { [shown, 0.0] };
+            take(&mut state.base, reading, Some(change), limits);
+            if drive.amplitude == 0.0 {
+                // A base without a drive rests.
+                state.base.unchanged = 0.0;
+            }
+        }
+        state.drive += self.detector.step * (drive.amplitude - state.drive);
     }
 
     /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.

@@ -1,8 +1,10 @@
-//! Tables: as text for a terminal, as HTML for a page.
+//! Tables and lines: as text for a terminal; tables as HTML for a page.
+
+use std::fmt::Display;
 
 use maud::{Markup, html};
 
-/// Headings and rows of cells.
+/// Headings, which may be absent, and rows of cells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
     headings: Vec<String>,
@@ -16,7 +18,12 @@ impl Table {
         Self { headings, rows: Vec::new() }
     }
 
-    /// With a row for each item; a row has as many cells as there are headings.
+    /// An empty table without headings.
+    pub fn plain() -> Self {
+        Self::default()
+    }
+
+    /// With a row for each item; all have as many cells as there are headings.
     pub fn rows<R: IntoIterator<Item: Into<Cell>>>(mut self, rows: impl IntoIterator<Item = R>) -> Self {
         let texts = |row: R| row.into_iter().map(|cell| cell.into().0).collect();
         self.rows.extend(rows.into_iter().map(texts));
@@ -31,9 +38,9 @@ impl Table {
     /// Columns under their headings, separated by two spaces; words to the left, numbers to the right.
     pub fn text(&self) -> String {
         let numbers = self.numbers();
-        let all = || std::iter::once(&self.headings).chain(&self.rows);
+        let all = || self.lines();
         let width = |n: usize| all().map(|row| row[n].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..self.headings.len()).map(width).collect();
+        let widths: Vec<usize> = (0..numbers.len()).map(width).collect();
         let line = |cells: &Vec<String>| {
             let cells = cells.iter().zip(&widths).zip(&numbers);
             let padded: Vec<String> = cells
@@ -64,14 +71,31 @@ impl Table {
         }
     }
 
+    /// The headings, unless they are absent, and the rows.
+    fn lines(&self) -> impl Iterator<Item = &Vec<String>> {
+        let headings = std::iter::once(&self.headings);
+        headings.filter(|headings| !headings.is_empty()).chain(&self.rows)
+    }
+
     /// Which columns hold numbers only.
     fn numbers(&self) -> Vec<bool> {
         let is_number =
             |cell: &str| ["–", "-", ""].contains(&cell) || cell.trim_end_matches(" %").parse::<f64>().is_ok();
-        (0..self.headings.len())
+        let columns = self.lines().next().map_or(0, Vec::len);
+        (0..columns)
             .map(|n| self.rows.iter().all(|row| is_number(&row[n])))
             .collect()
     }
+}
+
+/// Texts, a line each.
+pub fn lines(texts: impl IntoIterator<Item: Display>) -> String {
+    texts.into_iter().map(|text| format!("{text}\n")).collect()
+}
+
+/// A remark below a table.
+pub fn note(text: impl Display) -> String {
+    format!("  ({text})")
 }
 
 /// A number of a table; one that rounds to zero has no sign.
@@ -134,6 +158,13 @@ mod tests {
     #[test]
     fn words_are_set_to_the_left_and_numbers_to_the_right() {
         assert_eq!(table().text(), "  what        C\n  a < b     0.5\n  c      -10.25\n");
+    }
+
+    #[test]
+    fn a_table_without_headings_has_its_rows_only() {
+        let table = Table::plain().rows([["a", "G = 1"], ["bcd", "none"]]);
+        assert_eq!(table.text(), "  a    G = 1\n  bcd  none\n");
+        assert_eq!(lines(["a", "b"]), "a\nb\n");
     }
 
     #[test]

@@ -200,6 +200,7 @@ fn outside_by(plant: &Plant<Structure>, rounding: f64) -> f64 {
     ((w - plus).max(-w - minus) - rounding) / (0.5 * (plus + minus))
 }
 
+#[expect(clippy::too_many_lines, reason = "a test")]
 fn once(s: &Scene, saved: bool, figures: &mut Figures) -> Plant<Structure> {
     let mut plant = s.plant();
     let fastest = plant

@@ -586,6 +586,7 @@ mod tests {
     }
 
     /// Both interfaces sample by sample; prints the figures.
+    #[expect(clippy::too_many_lines, reason = "a test")]
     fn compare(name: &str, cavities: fn(&mut Random) -> Cavity) {
         let scenes = std::env::var("SCENES").map_or(SCENES, |n| n.parse::<u64>().expect("a number of scenes") / FEWER);
         // A rebound of the lowest hop has this speed where the wall presses with `8 omega0² b`.

@@ -18,13 +18,13 @@ use vines_scene::plan::Plan;
 use vines_scene::scene::Measurand;
 
 pub use asked::Departure;
-pub(crate) use decay::PER_PERIOD;
-pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, base_at_rest, decay_points, harmonic};
+pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
+pub(crate) use decay::{PER_PERIOD, base_at_rest};
 pub use level::{Criterion, LevelEstimate, Unsteady};
 pub(crate) use level::{LAG, LONGEST, is_off_target};
 pub use resonance_fit::{Cycle, ResonanceFit};
-pub(crate) use response::{ASYMMETRIC, Line, degrees, subharmonic, without_tones};
-pub use response::{Tone, classify, drive_harmonics, foreign_tone, impacts, regime_by_response};
+pub(crate) use response::{ASYMMETRIC, Line, classify, degrees, subharmonic, without_tones};
+pub use response::{Tone, drive_harmonics, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
 
 /// Why a record cannot be identified.

@@ -148,7 +148,6 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         let channel = CheckedChannel { noise, floor, ..CheckedChannel::default() };
         channel.at(ratio, omega * step)
     });
-    let amplitudes = expected.map(|response| response.norm());
     // A delay that looks like the opposite sign is at least this long.
     let first = (samples(1) as f64 * (PI - IN_TIME) / TAU) as usize;
     let lead = target.measurands[1].lead();
@@ -162,11 +161,8 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         (expected[1], 0.0)
     };
     let period = samples(1);
-    let phasors = |readings: &[[f64; 3]], of: usize| -> (Vec<Complex64>, Vec<f64>) {
-        let periods = readings.chunks_exact(period);
-        periods.map(|readings| fitted(readings, of, 0, &target, omega)).unzip()
-    };
     let readings = &readings[begins..];
+    let phasors = |readings: &[[f64; 3]], channel| by_period(readings, channel, period, &target, omega);
     let (response, rests) = phasors(readings, 1);
     let (beside, _) = phasors(&beside_driven_mode(readings, plan, omega, amplitude), 1);
     let alone: Vec<Complex64> = response.iter().zip(&beside).map(|(z, other)| z - other).collect();
@@ -184,6 +180,7 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
         channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
         quantities.extend(of_response(&response, ratio, plan));
     }
+    let amplitudes = expected.map(|response| response.norm());
     let verdict = verdict(&channels, &amplitudes, has_base, waits);
     let refused = quantities.iter().find_map(CheckedQuantity::refusal);
     let verdict = refused.filter(|refusal| verdict.may_be(*refusal)).unwrap_or(verdict);
@@ -285,6 +282,20 @@ fn fitted(readings: &[[f64; 3]], channel: usize, trend: usize, target: &Target, 
             let rest = mean_square(rest.iter().copied()).sqrt();
             (fit.harmonic(1) * displacement, rest * displacement.norm())
         })
+}
+
+/// Phasors of a signal period by period, each of `period` samples, and the rests; as [`fitted`] gives them.
+fn by_period(
+    readings: &[[f64; 3]],
+    channel: usize,
+    period: usize,
+    target: &Target,
+    omega: f64,
+) -> (Vec<Complex64>, Vec<f64>) {
+    let periods = readings.chunks_exact(period);
+    periods
+        .map(|readings| fitted(readings, channel, 0, target, omega))
+        .unzip()
 }
 
 // A rig that is driven with its loop open.

@@ -59,7 +59,7 @@ pub fn table(samples: &[Sample], target: &Target) -> String {
 }
 
 /// Phases of the drive at the samples, rad, from `start` at the first.
-pub fn drive_phases(samples: &[Sample], sample_time: f64, start: f64) -> Vec<f64> {
+pub(crate) fn drive_phases(samples: &[Sample], sample_time: f64, start: f64) -> Vec<f64> {
     let advance = |phase: &mut f64, sample: &Sample| {
         let now = *phase;
         *phase += sample.command.drive.omega * sample_time;

@@ -221,7 +221,7 @@ pub fn has_mirror_images(plant: &Parameters) -> bool {
 }
 
 /// Acceleration of the structure up to which static friction carries a particle that touches no wall, m/s²; 0 without friction.
-pub fn carried_up_to(plant: &Parameters) -> f64 {
+pub(crate) fn carried_up_to(plant: &Parameters) -> f64 {
     let Cavity { kinetic_friction, static_friction, tilt, .. } = plant.cavity;
     let held = static_friction.unwrap_or(kinetic_friction) * tilt.cos();
     (GRAVITY * (held - tilt.sin().abs())).max(0.0)

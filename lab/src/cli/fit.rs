@@ -2,7 +2,6 @@
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -15,7 +14,7 @@ use vines::numerics::Estimate;
 use vines::report::fitted;
 use vines::scene::Scene;
 use vines::survey::without_other_modes;
-use vines::table::Table;
+use vines::table::{Table, lines};
 use vines::{ArgumentError, cells};
 
 use super::failure::Failure;
@@ -224,7 +223,7 @@ fn of_linear(verdict: &LinearVerdict) -> String {
             "the points contradict them, and both are left out: a cavity that is not ideal or a particle that slides may be the reason"
         }
     };
-    format!("linear response: f0 = {f0} Hz, zeta = {zeta}: {rises}: {result}\n")
+    format!("linear response: f0 = {f0} Hz, zeta = {zeta}: {rises}: {result}")
 }
 
 /// A value and its standard uncertainty with two digits of it.
@@ -311,7 +310,6 @@ pub(super) fn run(
     let scene = arguments.scene.load()?;
     writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
     let Gathered { measured, skipped, notes } = gathered(arguments, &scene, read)?;
-    let lines = |lines: &[String]| lines.iter().map(|line| format!("{line}\n")).collect::<String>();
     if measured.points.is_empty() && measured.recordings.is_empty() && skipped == 0 && !notes.is_empty() {
         let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines(&notes))?;
         return Ok(Results::new(text, Written::default));
@@ -343,10 +341,10 @@ pub(super) fn run(
             lines(&notes),
             recorded(&found.parts),
             summary(&report, &found, skipped),
-            lines(found.points_instead.as_slice()),
+            lines(found.points_instead.as_ref()),
             lines(&found.off_target),
-            found.linear.iter().map(of_linear).collect(),
-            lines(verdict.as_slice()),
+            lines(found.linear.iter().map(of_linear)),
+            lines(&verdict),
             only_if_ideal(&alternatives, is_assumed),
         ]
         .concat()
@@ -398,8 +396,33 @@ fn recorded(parts: &[Part]) -> String {
         + "\n"
 }
 
+/// The parameters beside those of the scene, whether the model describes the data, and what in them is not as it should be.
 fn summary(report: &FitReport, found: &Found, skipped: usize) -> String {
-    let (record, points) = (found.record.as_ref(), found.points.len());
+    let record = found.record.as_ref();
+    let of_record = record.iter().flat_map(|record| &record.left_out);
+    let of_record = of_record.map(|LeftOut { origin, seconds: [from, to] }| {
+        format!("{origin}: {from:.2} s to {to:.2} s does not belong to the motion, and is left out")
+    });
+    let skipped = (skipped > 0).then(|| format!("{skipped} points are not settled or not symmetric 1:1, and left out"));
+    let numbers: Vec<String> = report.left_out.iter().map(usize::to_string).collect();
+    let contradicting = (!numbers.is_empty()).then(|| {
+        format!(
+            "{} of {} points contradict the others, and are left out: {}",
+            numbers.len(),
+            found.points.len(),
+            numbers.join(", ")
+        )
+    });
+    let notes = of_record
+        .chain(wrong_uncertainties(report))
+        .chain(skipped)
+        .chain(contradicting);
+    let verdict = chi_square(report, record.map(|record| record.periods));
+    format!("{}\n{verdict}\n{}", parameters(report).text(), lines(notes))
+}
+
+/// The parameters of a fit beside those of the scene.
+fn parameters(report: &FitReport) -> Table {
     let doubt = if report.describes { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|parameter| {
         let FittedParameter { symbol, unit, value, uncertainty, expected } = *parameter;
@@ -413,9 +436,11 @@ fn summary(report: &FitReport, found: &Found, skipped: usize) -> String {
         };
         cells![symbol, value, unit, expected, difference]
     });
-    let mut text = Table::new("parameter | value | unit | scene | difference")
-        .rows(rows)
-        .text();
+    Table::new("parameter | value | unit | scene | difference").rows(rows)
+}
+
+/// What chi-square says; `periods`: of recordings, if they are fitted.
+fn chi_square(report: &FitReport, periods: Option<usize>) -> String {
     let p = report
         .p_value
         .map_or_else(|| "without a degree of freedom".into(), |p| format!("p = {p:.2}"));
@@ -428,50 +453,29 @@ fn summary(report: &FitReport, found: &Found, skipped: usize) -> String {
         ),
         (false, _) => "the model does not describe them".into(),
     };
-    let what = match record {
-        Some(record) => format!("{} periods of recordings", record.periods),
+    let what = match periods {
+        Some(periods) => format!("{periods} periods of recordings"),
         None => format!("{} points", report.residuals.len()),
     };
-    let _ = writeln!(
-        text,
-        "\n{what}; chi-square {:.1} for {} degrees of freedom ({p}): {verdict}",
-        report.chi_square, report.degrees
-    );
-    for LeftOut { origin, seconds: [from, to] } in record.iter().flat_map(|record| &record.left_out) {
-        let _ = writeln!(
-            text,
-            "{origin}: {from:.2} s to {to:.2} s does not belong to the motion, and is left out"
-        );
-    }
-    for (channel, test) in ["responses", "frequencies", "drives"].into_iter().zip(&report.channels) {
+    let FitReport { chi_square, degrees, .. } = report;
+    format!("{what}; chi-square {chi_square:.1} for {degrees} degrees of freedom ({p}): {verdict}")
+}
+
+/// The channels whose uncertainties do not agree with their residuals.
+fn wrong_uncertainties(report: &FitReport) -> impl Iterator<Item = String> {
+    let channels = ["responses", "frequencies", "drives"].into_iter().zip(&report.channels);
+    channels.filter_map(|(channel, test)| {
         let size = match test.verdict() {
             Some(Ordering::Less) => "small",
             Some(Ordering::Greater) => "large",
-            _ => continue,
+            _ => return None,
         };
         let [found, expected] = [test.chi_square, test.expected];
         let decimals = decimals(found.min(expected));
-        let _ = writeln!(
-            text,
+        Some(format!(
             "the uncertainties of the {channel} are too {size}: their chi-square is {found:.decimals$}, and {expected:.decimals$} is expected"
-        );
-    }
-    if skipped > 0 {
-        let _ = writeln!(
-            text,
-            "{skipped} points are not settled or not symmetric 1:1, and left out"
-        );
-    }
-    if !report.left_out.is_empty() {
-        let numbers: Vec<String> = report.left_out.iter().map(usize::to_string).collect();
-        let _ = writeln!(
-            text,
-            "{} of {points} points contradict the others, and are left out: {}",
-            numbers.len(),
-            numbers.join(", ")
-        );
-    }
-    text
+        ))
+    })
 }
 
 /// Where the plant of a scene comes from.

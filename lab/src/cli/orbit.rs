@@ -22,7 +22,7 @@ use vines::{
 };
 use vines::{
     cells,
-    table::{Table, number},
+    table::{Table, lines, note, number},
 };
 
 use super::output::{Results, output, stability, writable};
@@ -308,7 +308,7 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
         let table = Table::new("phase, degrees | event | side | w' before, m/s").rows(rows);
         let ideal = ideal.as_ref().map_or(String::new(), |(left_out, sigma, a_m)| {
             let results = format!("sigma = {sigma:.6} and response {a_m:.6e} m are");
-            format!("  ({})\n", summary::ideal(&results, left_out))
+            lines([note(summary::ideal(&results, left_out))])
         });
         format!(
             "  {f_hz:.6} Hz, sigma = {sigma:.6}; base {amplitude:.6e} m; response {a_m:.6e} m at {phase_deg:.4} degrees\n  in {periods} period{}: \
@@ -468,7 +468,7 @@ fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, 
         String::new()
     };
     let (low, high) = range((f64::MAX, f64::MIN), points.iter().map(|place| place.numbers[0]));
-    let mut text = format!(
+    let head = format!(
         "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable{neutral}; {ends}\n",
         points.len()
     );
@@ -477,12 +477,13 @@ fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, 
         cells![*sigma, *g, *c, gamma.to_degrees(), *b, *largest, *stability]
     });
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
-    text += &table.rows(rows).text();
-    for (kind, Place { numbers: [sigma, g, c, _, b], .. }) in special {
-        let (name, g) = (kind.name(), number(g));
-        text += &format!("  {name} at sigma = {sigma:.6}, G = {g}, C = {c:.6}, B = {b:.6}\n");
-    }
-    text + "\n"
+    let special = special
+        .iter()
+        .map(|(kind, Place { numbers: [sigma, g, c, _, b], .. })| {
+            let (name, g) = (kind.name(), number(*g));
+            format!("  {name} at sigma = {sigma:.6}, G = {g}, C = {c:.6}, B = {b:.6}")
+        });
+    format!("{head}{}{}\n", table.rows(rows).text(), lines(special))
 }
 
 /// Orbits, a line each.

@@ -10,7 +10,7 @@ use vines::numerics::SIGNIFICANT;
 use vines::orbit::Orbit;
 use vines::regime_map::Map;
 use vines::scene::{Definition, Dimensionless, Scene};
-use vines::table::{Table, with_uncertainty};
+use vines::table::{Table, lines, note, with_uncertainty};
 
 /// The dimensionless numbers of a scene, in one line.
 pub(super) fn parameters(p: &Dimensionless) -> String {
@@ -190,7 +190,6 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
             at.u_phase_deg
         )
     };
-    let lines = |notes: Vec<String>| notes.iter().map(|note| format!("  ({note})\n")).collect::<String>();
     if lock.regime_by_impacts.is_none() {
         let (locked, decay) = (locked(lock.regime.motion().into()), decay_in_metres(result, &units));
         let notes = [
@@ -200,7 +199,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         ];
         return format!(
             "{measured}{locked}{}\n{decay}\n",
-            lines(notes.into_iter().flatten().collect())
+            lines(notes.into_iter().flatten().map(note))
         );
     }
     let name = match result.curve.is_of_structure {
@@ -213,7 +212,9 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let theory = result.theory.map(|one| cells![name, one.sigma, one.c, one.b]);
     let table = Table::new(" | sigma | C | B").rows([Some(own), exact, theory].into_iter().flatten());
     let exact = result.exact.as_ref().map_or(String::new(), |Orbit { g, .. }| {
-        format!("  (the exact orbit has the measured C, and the drive G = {g:.6}; theory is at the requested G)\n")
+        lines([note(format!(
+            "the exact orbit has the measured C, and the drive G = {g:.6}; theory is at the requested G"
+        ))])
     });
     format!(
         "{measured}{}, G = {}\n{}\n{}{SYMBOLS}{exact}{}\n{}\n{}\n",
@@ -221,7 +222,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         with_uncertainty(at.g, at.u_g),
         locked(format!("{}, {}", lock.regime, lock.impacts())),
         table.text(),
-        lines(notes(result)),
+        lines(notes(result).iter().map(note)),
         decay(result),
         agreement(result)
     )
@@ -442,28 +443,33 @@ pub(super) fn tracked(result: &TrackedComparison, scene: &Scene) -> String {
     });
     let headings = "C | sigma | G | off target | periods | averaged | error | regime by response / by impacts";
     let table = Table::new(headings).rows(rows);
-    let mut worst = result.worst().map_or(String::new(), |worst| {
+    let worst = result.worst().map(|worst| {
         format!(
             "Largest error of a settled point, in sigma or G against the exact backbone at the same C: {:.1e} (distance from the nearest \
-             place of the curve: {:.1e})\n",
+             place of the curve: {:.1e})",
             worst.at_equal_c, worst.nearest
         )
     });
-    worst += &drive_harmonics(result, scene);
     let hidden = points().map(|compared| &compared.point).filter(|point| {
         let regimes = (point.regime, point.regime_by_impacts);
         point.settled && regimes == (Regime::Symmetric, Some(Regime::Asymmetric))
     });
     let hidden = hidden.count();
-    if hidden > 0 {
-        worst += &format!(
-            "Settled points whose response looks symmetric, but whose impacts are asymmetric (not the symmetric backbone): {hidden}\n"
-        );
-    }
-    if let Some(left_out) = &result.left_out {
-        worst += &format!("({})\n", ideal("the exact backbone is", left_out));
-    }
-    format!("{}\n\n{}\n{duration}{worst}", rig(&result.parameters), table.text())
+    let hidden = (hidden > 0).then(|| {
+        format!(
+            "Settled points whose response looks symmetric, but whose impacts are asymmetric (not the symmetric backbone): {hidden}"
+        )
+    });
+    let left_out = result.left_out.as_ref();
+    let left_out = left_out.map(|left_out| format!("({})", ideal("the exact backbone is", left_out)));
+    format!(
+        "{}\n\n{}\n{duration}{}{}{}",
+        rig(&result.parameters),
+        table.text(),
+        lines(worst),
+        drive_harmonics(result, scene),
+        lines(hidden.into_iter().chain(left_out))
+    )
 }
 
 /// Distance from the phase target, and periods that a point took and that are averaged.

@@ -111,17 +111,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
 }
 
 fn thresholds(activation: &Activation, sigma: f64) -> String {
-    let stable = activation
-        .stable
-        .map_or("none at any G".into(), |g| format!("G = {g:.6}"));
-    format!(
-        "Activation at sigma = {sigma:.6}\n  steady linear response reaches the wall      G = {:.6}\n  \
-         impacts begin from rest, e = E sin(omega t)  G = {:.6} (exact)\n  \
-         the same with the best phase of e            G = {:.6} (exact)\n  \
-         some 1:1 motion exists                       G = {:.6}\n  \
-         a stable one exists                          {stable}\n",
-        activation.steady_linear, activation.from_rest, activation.from_rest_any_phase, activation.existence
-    )
+    let drive = |g: f64| format!("G = {g:.6}");
+    let exact = |g: f64| format!("{} (exact)", drive(g));
+    let Activation {
+        steady_linear,
+        from_rest,
+        from_rest_any_phase,
+        existence,
+        stable,
+        ..
+    } = *activation;
+    let rows = [
+        cells!["steady linear response reaches the wall", drive(steady_linear)],
+        cells!["impacts begin from rest, e = E sin(omega t)", exact(from_rest)],
+        cells!["the same with the best phase of e", exact(from_rest_any_phase)],
+        cells!["some 1:1 motion exists", drive(existence)],
+        cells!["a stable one exists", stable.map_or("none at any G".into(), drive)],
+    ];
+    format!("Activation at sigma = {sigma:.6}\n{}", Table::plain().rows(rows).text())
 }
 
 fn row(branch: BranchSide, numbers: [f64; 3], [impacts, slow_flow]: [bool; 2]) -> [Cell; 6] {

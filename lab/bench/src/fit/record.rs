@@ -938,6 +938,53 @@ impl Followed<'_> {
         Some((again, found))
     }
 
+    /// The search again, with all stretches, until it ends where it began: by better parameters more belongs, and a narrow valley ends it early.
+    fn completed(self, found: (Minimum, Vec<Cut>), all: &[Stretch]) -> (Self, Minimum, Vec<Cut>, Covariance) {
+        let (mut followed, (mut minimum, mut out)) = (self, found);
+        loop {
+            let again = Some(minimum.x).filter(|_| followed.stretches != all);
+            let again = again.and_then(|x| followed.again(all, x));
+            if let Some(found) = again.filter(|(again, _)| again.followed() > followed.followed()) {
+                (followed, (minimum, out)) = found;
+                continue;
+            }
+            let (covariance, lower) = followed.covariance(&minimum);
+            let again = lower.and_then(|lower| followed.again(all, lower));
+            let each = |minimum: &Minimum| minimum.chi_square / minimum.residuals.len() as f64;
+            let is_better = |(again, (next, _)): &(Followed, (Minimum, _))| {
+                let more = again.followed().cmp(&followed.followed());
+                more.is_gt() || more.is_eq() && each(next) < each(&minimum)
+            };
+            let Some(found) = again.filter(is_better) else {
+                return (followed, minimum, out, covariance);
+            };
+            (followed, (minimum, out)) = found;
+        }
+    }
+
+    /// The fit at a minimum, with the tests of its innovations. `None` with fewer equations than unknowns.
+    fn fit(&self, minimum: &Minimum, covariance: Covariance, left_out: Vec<LeftOut>) -> Option<RecordFit> {
+        let innovations: Vec<Vector2<f64>> = self.each(&minimum.x).concat();
+        let count = innovations.len();
+        let mut fit = self.problem.found(minimum, &minimum.trace);
+        fit.covariance = covariance;
+        fit.degrees = (2 * count + self.problem.equations()).checked_sub(5 + usize::from(self.problem.has_scale))?;
+        let channel = |i: usize| innovations.iter().map(move |one| one[i]);
+        let free = minimum.covariance();
+        let rows = &minimum.derivatives[minimum.derivatives.len() - 2 * count..];
+        for i in 0..2 {
+            // Degrees of freedom that the parameters take of the channel.
+            let taken: f64 = rows.iter().skip(i).step_by(2).map(|row| row.dot(&(free * row))).sum();
+            fit.channels[i] = ChannelTest::of(channel(i).map(|one| one * one).sum(), count as f64 - taken);
+        }
+        let neighbours =
+            |i: usize| mean(innovations.windows(2).map(|pair| pair[0][i] * pair[1][i])) / mean_square(channel(i));
+        let colour = 0.5 * (neighbours(0) + neighbours(1));
+        // Sums of coloured innovations vary more, by this factor if each is a part of the one before and new noise.
+        fit.covariance *= ((1.0 + colour) / (1.0 - colour)).max(1.0);
+        Some(RecordFit { fit, periods: count, left_out, colour })
+    }
+
     /// Samples that are followed.
     fn followed(&self) -> usize {
         samples(self.stretches.iter().copied())
@@ -1134,28 +1181,8 @@ pub fn follow(
         let mut followed = Followed { beside, ..followed.clone() };
         followed.search(x).map(|found| (followed, found))
     });
-    let (mut followed, (mut minimum, mut out)) = searched.find_map(|found| found)?;
-    let covariance = loop {
-        // By better parameters, more belongs.
-        let again = Some(minimum.x).filter(|_| followed.stretches != all);
-        let again = again.and_then(|x| followed.again(&all, x));
-        if let Some(found) = again.filter(|(again, _)| again.followed() > followed.followed()) {
-            (followed, (minimum, out)) = found;
-            continue;
-        }
-        let (covariance, lower) = followed.covariance(&minimum);
-        // A narrow valley ends the search early.
-        let again = lower.and_then(|lower| followed.again(&all, lower));
-        let each = |minimum: &Minimum| minimum.chi_square / minimum.residuals.len() as f64;
-        let is_better = |(again, (next, _)): &(Followed, (Minimum, _))| {
-            let more = again.followed().cmp(&followed.followed());
-            more.is_gt() || more.is_eq() && each(next) < each(&minimum)
-        };
-        let Some(found) = again.filter(is_better) else {
-            break covariance;
-        };
-        (followed, (minimum, out)) = found;
-    };
+    let (followed, found) = searched.find_map(|found| found)?;
+    let (followed, minimum, out, covariance) = followed.completed(found, &all);
     // A particle that slides looks like one in another cavity: without a third harmonic of impacts, the rig must be about the expected one.
     let is_shown = parts.iter().flatten().any(|part| part.regime == Regime::Symmetric);
     let strange = expectations(expected)
@@ -1167,24 +1194,6 @@ pub fn follow(
     if !is_shown && is_strange || !followed.needs_impacts(expected) {
         return None;
     }
-    let innovations: Vec<Vector2<f64>> = followed.each(&minimum.x).concat();
-    let count = innovations.len();
-    let mut fit = problem.found(&minimum, &minimum.trace);
-    fit.covariance = covariance;
-    fit.degrees = (2 * count + problem.equations()).checked_sub(5 + usize::from(problem.has_scale))?;
-    let channel = |i: usize| innovations.iter().map(move |one| one[i]);
-    let free = minimum.covariance();
-    let rows = &minimum.derivatives[minimum.derivatives.len() - 2 * count..];
-    for i in 0..2 {
-        // Degrees of freedom that the parameters take of the channel.
-        let taken: f64 = rows.iter().skip(i).step_by(2).map(|row| row.dot(&(free * row))).sum();
-        fit.channels[i] = ChannelTest::of(channel(i).map(|one| one * one).sum(), count as f64 - taken);
-    }
-    let neighbours =
-        |i: usize| mean(innovations.windows(2).map(|pair| pair[0][i] * pair[1][i])) / mean_square(channel(i));
-    let colour = 0.5 * (neighbours(0) + neighbours(1));
-    // Sums of coloured innovations vary more, by this factor if each is a part of the one before and new noise.
-    fit.covariance *= ((1.0 + colour) / (1.0 - colour)).max(1.0);
     let left_out = out.iter().map(|Cut { stretch: Stretch { record, span }, .. }| {
         let Recording { origin, sample_time, .. } = &recordings[*record];
         LeftOut {
@@ -1192,6 +1201,5 @@ pub fn follow(
             seconds: span.map(|n| n as f64 * sample_time),
         }
     });
-    let left_out = left_out.collect();
-    Some(RecordFit { fit, periods: count, left_out, colour })
+    followed.fit(&minimum, covariance, left_out.collect())
 }

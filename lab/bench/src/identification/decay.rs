@@ -60,7 +60,7 @@ pub enum DecayEnd {
     /// The impacts took away less than half of what they did at the release, on a rig that does not report impacts.
     #[serde(rename = "end of the impacts")]
     Linear,
-    /// There are none: the base goes on moving with the frequency of the drive ([`base_at_rest`]).
+    /// There are none: the base goes on moving with the frequency of the drive.
     #[serde(rename = "base not at rest")]
     Driven,
     /// There are none: another mode moves freely beside the driven one, nearer than a window can tell apart.
@@ -166,7 +166,7 @@ const ROUNDING: f64 = 1e-14;
 ///
 /// # Errors
 /// The amplitude of the base, m, in the period in which it is least, if the base rests nowhere.
-pub fn base_at_rest(record: &Record, knowledge: &Knowledge) -> Result<usize, Estimate> {
+pub(crate) fn base_at_rest(record: &Record, knowledge: &Knowledge) -> Result<usize, Estimate> {
     let (decay, dt, target) = (record.decay(), record.sample_time, &knowledge.target);
     let readings: Option<Vec<f64>> = decay.iter().map(|sample| sample.sensors.reference).collect();
     let readings = readings.filter(|_| knowledge.shaker.is_none());

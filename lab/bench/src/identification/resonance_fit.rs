@@ -69,7 +69,7 @@ const WIDE: f64 = 3.0;
 
 impl ResonanceFit {
     /// Fewest periods: one more than the coefficients.
-    pub const FEWEST: usize = 4;
+    pub(crate) const FEWEST: usize = 4;
 
     /// From at least four periods of a rig of which this is known; `slopes`: of `E_R` and `omega_R` over the amplitude, from neighbouring points of the
     /// backbone.
@@ -380,6 +380,34 @@ pub struct Cycle {
 /// Harmonics that are fitted to a displacement.
 const HARMONICS: usize = 3;
 
+/// What is fitted to a channel over one period of the drive.
+struct Bases {
+    harmonics: usize,
+    /// Offset and harmonics.
+    basis: HarmonicBasis,
+    /// The first harmonic drifts as well: a change of the amplitude within the period is not noise.
+    drifting: HarmonicBasis,
+}
+
+impl Bases {
+    fn new(phases: &[f64], harmonics: usize) -> Self {
+        let mut degrees = vec![Some(0); harmonics];
+        let basis = HarmonicBasis::new(phases, 0, &degrees);
+        degrees[0] = Some(1);
+        let drifting = HarmonicBasis::new(phases, 0, &degrees);
+        Self { harmonics, basis, drifting }
+    }
+
+    /// The fundamental of a signal, and the variance of each of its components by noise. `coloured`: spectrum of the noise at the fundamental, over its
+    /// mean.
+    fn fundamental(&self, values: &DVector<f64>, coloured: f64) -> Option<(Complex<f64>, f64)> {
+        let fit = self.basis.fit(values)?;
+        let residual = self.drifting.residual(values, &self.drifting.fit(values)?);
+        let variance = residual.norm_squared() / (values.len() - self.drifting.terms()) as f64;
+        Some((fit.harmonic(1), variance * coloured * 2.0 / values.len() as f64))
+    }
+}
+
 impl Cycle {
     /// The samples of one period; `phase` (rad): phase of the drive at the first, `target`: phase target of the response relative to the base, and
     /// what both channels measure. `None` for too few samples.
@@ -396,13 +424,6 @@ impl Cycle {
         let uniform: Vec<f64> = (0..samples.len())
             .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)
             .collect();
-        // A change of the amplitude within the period is not noise.
-        let bases = |count: usize| {
-            let mut degrees = vec![Some(0); count];
-            let basis = HarmonicBasis::new(&uniform, 0, &degrees);
-            degrees[0] = Some(1);
-            [basis, HarmonicBasis::new(&uniform, 0, &degrees)]
-        };
         let harmonics = |measurand| harmonics_of(measurand, samples.len() as f64, HARMONICS);
         // Impacts jerk the force of a shaker as they jerk an acceleration.
         let in_base = if target.through_shaker {
@@ -411,22 +432,18 @@ impl Cycle {
             HARMONICS
         };
         let in_response = harmonics(target.measurands[0]);
-        let of_base = bases(in_base);
-        let of_response = (in_response != in_base).then(|| bases(in_response));
-        let [basis, drifting] = &of_base;
+        let of_base = Bases::new(&uniform, in_base);
+        let of_response = (in_response != in_base).then(|| Bases::new(&uniform, in_response));
+        let Bases { basis, drifting, .. } = &of_base;
         let fitted = |channel: usize, value: fn(&Sample) -> f64| {
-            let displacement = target.displacement(channel, mean_omega);
-            let [basis, drifting] = of_response.as_ref().filter(|_| channel == 0).unwrap_or(&of_base);
+            let bases = of_response.as_ref().filter(|_| channel == 0).unwrap_or(&of_base);
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
-            let fit = basis.fit(&values)?;
-            let residual = drifting.residual(&values, &drifting.fit(&values)?);
-            let variance = residual.norm_squared() / (samples.len() - drifting.terms()) as f64;
-            let harmonics = if channel == 0 { in_response } else { in_base };
             // Above many harmonics a sensor shows impacts rather than noise.
-            let least = if harmonics > HARMONICS { 0 } else { HARMONICS };
+            let least = if bases.harmonics > HARMONICS { 0 } else { HARMONICS };
             let coloured = target.colour_of_fundamental(mean_omega, sample_time, least);
-            let variance = variance * coloured * 2.0 / samples.len() as f64;
-            Some((fit.harmonic(1) * displacement, variance * displacement.norm_sqr()))
+            let (fundamental, variance) = bases.fundamental(&values, coloured)?;
+            let displacement = target.displacement(channel, mean_omega);
+            Some((fundamental * displacement, variance * displacement.norm_sqr()))
         };
         let (response, noise) = fitted(0, |s| s.sensors.response)?;
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
@@ -454,11 +471,8 @@ impl Cycle {
             (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
         } else {
             let asked = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.command.drive.displacement));
-            match basis
-                .fit(&asked)
-                .map(|fit| fit.harmonic(1))
-                .filter(|asked| *asked != Complex::ZERO)
-            {
+            let asked = basis.fit(&asked).map(|fit| fit.harmonic(1));
+            match asked.filter(|asked| *asked != Complex::ZERO) {
                 // The drive of then. (The estimate of a controller is of some periods before.)
                 Some(asked) => {
                     let late = Complex::from_polar(1.0, mean_omega * target.delay - target.phase);

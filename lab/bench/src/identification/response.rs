@@ -367,7 +367,7 @@ impl Line {
     }
 
     /// Whether no motion of the particle produces it.
-    pub fn is_foreign(&self, d: &Dimensionless, sample_time: f64) -> bool {
+    pub(crate) fn is_foreign(&self, d: &Dimensionless, sample_time: f64) -> bool {
         let square = (self.turn / (sample_time * d.omega0)).powi(2);
         let largest = 4.0 / PI * d.epsilon * d.b * over_v(d.definition, square) / (square - 1.0).abs();
         self.amplitude() > ABOVE * largest
@@ -406,7 +406,7 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
 }
 
 /// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.
-pub fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
+pub(crate) fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
     let mut truths = samples.iter().filter_map(|sample| sample.ground_truth);
     let (Some(first), Some(last)) = (truths.next(), truths.next_back()) else {
         return (f64::NAN, Regime::Unknown);

@@ -39,20 +39,96 @@ pub(super) fn check(
 ) -> Result<LoopCheck, RigError> {
     let (target, linear) = (plan.knowledge.target, plan.knowledge.linear);
     let amplitude = share * plan.amplitude;
-    let mut periods = 0.0;
     let mut scaled = Scaled::new(rig, target);
     let mut rig = OpenLoop::new(&mut scaled, target, plan.knowledge.sample_time);
-    let window = |omega: f64| (WINDOW[0] as f64 * TAU / (omega * plan.knowledge.sample_time)).round() as usize;
-    // Response and reference at the end of two windows, their noise, and the frequency, which is complex while the response still changes.
-    let mut steady = |omega: f64| -> Result<(Complex64, [Complex64; 2], [f64; 2]), RigError> {
+    let frequencies = frequencies(linear.omega0, linear.damping_rate);
+    let mut all = Vec::new();
+    for omega in frequencies {
+        all.push(Steady::of(&mut rig, omega, amplitude)?);
+    }
+    let samples = window(linear.omega0, plan.knowledge.sample_time);
+    rig.end(samples / WINDOW[0])?;
+    let near = &all[..PLACES.len()];
+    let Steady { both: at, noise, .. } = near[PLACES.len() / 2];
+    let curve = Curve::of(near, &linear);
+    // By the noise of both phasors alone.
+    let of_noise = [0, 1].map(|n| noise[n] * (2.0 / samples as f64).sqrt() / at[n].norm());
+    let u_noise = curve.u_gain / curve.scatter * of_noise[0].hypot(of_noise[1]) * (at[1] / at[0]).norm();
+    let values: Vec<(f64, Complex64)> = frequencies
+        .into_iter()
+        .zip(&all)
+        // The control takes what readings are late from their phase.
+        .map(|(omega, one)| (omega, one.both[1] / amplitude * Complex64::cis(omega * plan.lock.delay)))
+        .collect();
+    let path = stated.fitted(curve.natural, curve.damping, &values);
+    let response = curve.response(path);
+    // At the root the other pole is twice the frequency away.
+    let reference = plan.knowledge.numbers.definition.reference;
+    let expected = response.oscillator_gain(curve.natural, reference) * response.rate(-curve.natural).conj();
+    let ratio = response.gain * Complex64::new(0.0, 2.0 * curve.natural) / expected;
+    let mut quantities = of_response(&response, ratio, plan).to_vec();
+    let error = path.error(curve.natural, &values);
+    quantities.extend(of_reference(&path, stated, at[1].norm() / amplitude, error));
+    let expected = amplitude * (0.5 * linear.omega0 / linear.damping_rate.max(f64::MIN_POSITIVE));
+    let verdict = match () {
+        () if !(at[0] + at[1]).is_finite() => Verdict::NotANumber,
+        () if at[0].norm() < DEAD * expected && at[1].norm() < DEAD * amplitude => Verdict::ShakerOff,
+        () if at[0].norm() < DEAD * expected => Verdict::ResponseDead,
+        () if at[1].norm() < DEAD * amplitude => Verdict::BaseDead,
+        () if ratio.re < 0.0 && ratio.arg().abs() > FRAC_PI_2 => Verdict::ResponseReversed,
+        () if near.iter().any(|one| !one.ratio().is_finite()) => Verdict::NotANumber,
+        () => quantities
+            .iter()
+            .find_map(CheckedQuantity::refusal)
+            .unwrap_or(Verdict::Healthy),
+    };
+    let channel = |n: usize, ratio: Complex64| {
+        let channel = CheckedChannel { noise: noise[n], ..CheckedChannel::default() };
+        channel.at(ratio, linear.omega0 * plan.knowledge.sample_time)
+    };
+    Ok(LoopCheck {
+        verdict,
+        amplitude,
+        share,
+        periods: all.iter().map(|one| one.periods).sum(),
+        u_noise,
+        response: channel(0, ratio),
+        base: Some(channel(1, at[1] / amplitude)),
+        linear: Some(Linear::new(response, plan)).filter(|_| verdict == Verdict::Healthy),
+        quantities,
+    })
+}
+
+/// Samples of a window at a frequency, rad/s.
+fn window(omega: f64, sample_time: f64) -> usize {
+    (WINDOW[0] as f64 * TAU / (omega * sample_time)).round() as usize
+}
+
+/// What response and reference read at a frequency when they are steady.
+#[derive(Clone, Copy)]
+struct Steady {
+    /// The frequency, rad/s, which is complex while the response still changes.
+    omega: Complex64,
+    /// The phasors.
+    both: [Complex64; 2],
+    /// RMS of everything else.
+    noise: [f64; 2],
+    /// Duration, periods.
+    periods: f64,
+}
+
+impl Steady {
+    /// Drives with the frequency `omega`, rad/s, and this amplitude, m.
+    fn of(rig: &mut OpenLoop<impl Rig + ?Sized>, omega: f64, amplitude: f64) -> Result<Self, RigError> {
+        let samples = window(omega, rig.step);
         let (mut last, mut before) = ([Complex64::ZERO; 2], [Complex64::ZERO; 2]);
-        let mut noise = [0.0; 2];
+        let (mut noise, mut periods) = ([0.0; 2], 0.0);
         for _ in 0..WINDOW[1] {
             rig.readings.clear();
-            rig.drive(window(omega), omega, amplitude)?;
+            rig.drive(samples, omega, amplitude)?;
             periods += WINDOW[0] as f64;
             // A heavy table on the suspension of a light armature floats for hundreds of periods: a parabola in a window.
-            let both = [1, 2].map(|channel| fitted(&rig.readings, channel, 2, &target, omega));
+            let both = [1, 2].map(|channel| fitted(&rig.readings, channel, 2, &rig.target, omega));
             let change = (0..2)
                 .map(|n| (both[n].0 - last[n]).norm() / both[n].0.norm())
                 .fold(0.0, f64::max);
@@ -63,83 +139,93 @@ pub(super) fn check(
             }
         }
         let middle = [0, 1].map(|n| 0.5 * (before[n] + last[n]));
-        let duration = window(omega) as f64 * plan.knowledge.sample_time;
+        let duration = samples as f64 * rig.step;
         let growth = (last[0] - before[0]) / (duration * middle[0]);
-        Ok((omega - Complex64::I * growth, middle, noise))
-    };
-    let frequencies = frequencies(linear.omega0, linear.damping_rate);
-    let mut all = Vec::new();
-    for omega in frequencies {
-        all.push(steady(omega)?);
+        Ok(Self {
+            omega: omega - Complex64::I * growth,
+            both: middle,
+            noise,
+            periods,
+        })
     }
-    rig.end(window(linear.omega0) / WINDOW[0])?;
-    let near = &all[..PLACES.len()];
-    let (_, at, noise) = near[PLACES.len() / 2];
-    // The curve of R/D.
-    let abscissas: Vec<Complex64> = near
-        .iter()
-        .map(|(omega, ..)| omega * omega / (2.0 * linear.omega0))
-        .collect();
-    let ratios: Vec<Complex64> = near.iter().map(|(_, both, _)| both[1] / both[0]).collect();
-    // In half-power bandwidths from the middle.
-    let x = abscissas.iter().sum::<Complex64>() / abscissas.len() as f64;
-    let unit = 2.0 * linear.damping_rate;
-    let row = |at: Complex64| RowVector3::new(Complex64::ONE, at, at * at);
-    let rows: Vec<_> = abscissas.iter().map(|one| row((one - x) / unit)).collect();
-    let nothing = Complex64::new(f64::NAN, 0.0);
-    let (found, inverse) = complex_fit(rows.iter().copied().zip(ratios.iter().copied()))
-        .unwrap_or_else(|| (Vector3::from_element(nothing), Matrix3::from_element(nothing)));
-    let slope_at = |at: Complex64| RowVector3::new(Complex64::ZERO, Complex64::ONE, 2.0 * at);
-    let mut root = -found[0] / found[1];
-    for _ in 0..ROUNDS {
-        root -= (row(root) * found)[0] / (slope_at(root) * found)[0];
+
+    /// Reference over response.
+    fn ratio(&self) -> Complex64 {
+        self.both[1] / self.both[0]
     }
-    let rest: f64 = rows
-        .iter()
-        .zip(&ratios)
-        .map(|(row, ratio)| (ratio - (row * found)[0]).norm_sqr())
-        .sum();
-    let scatter = (rest / (2.0 * ratios.len() as f64 - 6.0)).sqrt();
-    let u = |row: RowVector3<Complex64>| scatter * (row * inverse * row.adjoint())[0].re.sqrt();
-    let slope = (slope_at(root) * found)[0] / unit;
-    let u_gain = u(slope_at(root)) / (slope.norm() * unit);
-    // By the noise of both phasors alone.
-    let of_noise = [0, 1].map(|n| noise[n] * (2.0 / window(linear.omega0) as f64).sqrt() / at[n].norm());
-    let u_noise = u_gain / scatter * of_noise[0].hypot(of_noise[1]) * (at[1] / at[0]).norm();
-    let u_rate = u(row(root)) / slope.norm();
-    // The root is `omega0²/(2 w) (omega0 + i delta)/(omega0 - i delta)` with `w` of the scene, and the slope is proportional to `omega0 - i delta`.
-    let root = x + unit * root;
-    let natural = (2.0 * linear.omega0 * root.norm()).sqrt();
-    let damping = natural * (0.5 * root.arg()).tan();
-    let values: Vec<(f64, Complex64)> = frequencies
-        .into_iter()
-        .zip(&all)
-        // The control takes what readings are late from their phase.
-        .map(|(omega, (_, both, _))| (omega, both[1] / amplitude * Complex64::cis(omega * plan.lock.delay)))
-        .collect();
-    let path = stated.fitted(natural, damping, &values);
-    let response = LinearResponse {
-        omega0: natural,
-        damping_rate: damping,
-        uncertainty: u_rate.max(NOTED[0] * STEADY * natural),
-        gain: Complex64::new(damping / natural, 1.0) / slope,
-        u_gain,
-        particle: ParticleState::Unknown,
-        shaker: Some(path),
-    };
-    // At the root the other pole is twice the frequency away.
-    let reference = plan.knowledge.numbers.definition.reference;
-    let expected = response.oscillator_gain(natural, reference) * response.rate(-natural).conj();
-    let ratio = response.gain * Complex64::new(0.0, 2.0 * natural) / expected;
-    let mut quantities = of_response(&response, ratio, plan).to_vec();
-    quantities.extend([
-        noted(
-            "reference over command at the natural frequency",
-            "",
-            at[1].norm() / amplitude,
-            1.0,
-            FACTOR,
-        ),
+}
+
+/// The curve of reference over response, at its root.
+struct Curve {
+    /// Natural frequency, rad/s.
+    natural: f64,
+    /// Damping rate, rad/s.
+    damping: f64,
+    /// Standard uncertainty of both, rad/s.
+    u_rate: f64,
+    slope: Complex64,
+    /// Relative standard uncertainty of the slope.
+    u_gain: f64,
+    /// Standard deviation of each component of the ratios.
+    scatter: f64,
+}
+
+impl Curve {
+    /// The parabola through the ratios at these frequencies. `linear`: the response that the scene states.
+    fn of(near: &[Steady], linear: &LinearResponse) -> Self {
+        let abscissas: Vec<Complex64> = near
+            .iter()
+            .map(|one| one.omega * one.omega / (2.0 * linear.omega0))
+            .collect();
+        let ratios: Vec<Complex64> = near.iter().map(Steady::ratio).collect();
+        // In half-power bandwidths from the middle.
+        let x = abscissas.iter().sum::<Complex64>() / abscissas.len() as f64;
+        let unit = 2.0 * linear.damping_rate;
+        let row = |at: Complex64| RowVector3::new(Complex64::ONE, at, at * at);
+        let rows: Vec<_> = abscissas.iter().map(|one| row((one - x) / unit)).collect();
+        let nothing = Complex64::new(f64::NAN, 0.0);
+        let (found, inverse) = complex_fit(rows.iter().copied().zip(ratios.iter().copied()))
+            .unwrap_or_else(|| (Vector3::from_element(nothing), Matrix3::from_element(nothing)));
+        let slope_at = |at: Complex64| RowVector3::new(Complex64::ZERO, Complex64::ONE, 2.0 * at);
+        let mut root = -found[0] / found[1];
+        for _ in 0..ROUNDS {
+            root -= (row(root) * found)[0] / (slope_at(root) * found)[0];
+        }
+        let rest: f64 = rows
+            .iter()
+            .zip(&ratios)
+            .map(|(row, ratio)| (ratio - (row * found)[0]).norm_sqr())
+            .sum();
+        let scatter = (rest / (2.0 * ratios.len() as f64 - 6.0)).sqrt();
+        let u = |row: RowVector3<Complex64>| scatter * (row * inverse * row.adjoint())[0].re.sqrt();
+        let slope = (slope_at(root) * found)[0] / unit;
+        let u_gain = u(slope_at(root)) / (slope.norm() * unit);
+        let u_rate = u(row(root)) / slope.norm();
+        // The root is `omega0²/(2 w) (omega0 + i delta)/(omega0 - i delta)` with `w` of the scene, and the slope is proportional to `omega0 - i delta`.
+        let root = x + unit * root;
+        let natural = (2.0 * linear.omega0 * root.norm()).sqrt();
+        let damping = natural * (0.5 * root.arg()).tan();
+        Self { natural, damping, u_rate, slope, u_gain, scatter }
+    }
+
+    /// The frequency response, behind this shaker.
+    fn response(&self, path: ShakerPath) -> LinearResponse {
+        LinearResponse {
+            omega0: self.natural,
+            damping_rate: self.damping,
+            uncertainty: self.u_rate.max(NOTED[0] * STEADY * self.natural),
+            gain: Complex64::new(self.damping / self.natural, 1.0) / self.slope,
+            u_gain: self.u_gain,
+            particle: ParticleState::Unknown,
+            shaker: Some(path),
+        }
+    }
+}
+
+/// What the shaker makes of its command: `gain`, reference over command at the natural frequency, and the largest relative error of the model of it.
+fn of_reference(path: &ShakerPath, stated: &ShakerPath, gain: f64, error: f64) -> [CheckedQuantity; 4] {
+    [
+        noted("reference over command at the natural frequency", "", gain, 1.0, FACTOR),
         noted(
             "drop-out: this over the reference of a structure that does not move",
             "",
@@ -157,39 +243,11 @@ pub(super) fn check(
         quantity(
             "reference over command, largest relative error of its model",
             "",
-            [path.error(natural, &values), STEADY, 0.0],
+            [error, STEADY, 0.0],
             ROBUST,
             Some(Verdict::ShakerResonance),
         ),
-    ]);
-    let expected = amplitude * (0.5 * linear.omega0 / linear.damping_rate.max(f64::MIN_POSITIVE));
-    let verdict = match () {
-        () if !(at[0] + at[1]).is_finite() => Verdict::NotANumber,
-        () if at[0].norm() < DEAD * expected && at[1].norm() < DEAD * amplitude => Verdict::ShakerOff,
-        () if at[0].norm() < DEAD * expected => Verdict::ResponseDead,
-        () if at[1].norm() < DEAD * amplitude => Verdict::BaseDead,
-        () if ratio.re < 0.0 && ratio.arg().abs() > FRAC_PI_2 => Verdict::ResponseReversed,
-        () if ratios.iter().any(|ratio| !ratio.is_finite()) => Verdict::NotANumber,
-        () => quantities
-            .iter()
-            .find_map(CheckedQuantity::refusal)
-            .unwrap_or(Verdict::Healthy),
-    };
-    let channel = |n: usize, ratio: Complex64| {
-        let channel = CheckedChannel { noise: noise[n], ..CheckedChannel::default() };
-        channel.at(ratio, linear.omega0 * plan.knowledge.sample_time)
-    };
-    Ok(LoopCheck {
-        verdict,
-        amplitude,
-        share,
-        periods,
-        u_noise,
-        response: channel(0, ratio),
-        base: Some(channel(1, at[1] / amplitude)),
-        linear: Some(Linear::new(response, plan)).filter(|_| verdict == Verdict::Healthy),
-        quantities,
-    })
+    ]
 }
 
 /// A quantity that is told, not refused.

@@ -73,7 +73,7 @@ impl SimulatedStructure {
 
     /// With a fault of the shaker that begins after some seconds.
     #[must_use]
-    pub fn failing(self, fault: ShakerFault, seconds: f64) -> Self {
+    pub(crate) fn failing(self, fault: ShakerFault, seconds: f64) -> Self {
         Self { fault: Some((fault, seconds)), ..self }
     }
 

@@ -868,6 +868,7 @@ fn a_heavy_shaker_or_one_in_other_units_is_doubted() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a test")]
 fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
     for (n, from, to, parts) in [
         (0, "\nmass = 0.057", "\nmass = 0", ["mass of the armature", "kg"]),

@@ -1,12 +1,10 @@
 //! The `[chain]` section: the measurement chain between rig and controller, off by default.
 
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    ControllerSettings, Excitation, Reference, Scene, SceneError, check, not_negative, option, positive, within,
-};
+use super::{Excitation, Reference, Scene, option};
 
 settings! {
     /// The stages between the rig and the controller; each can be switched off.
@@ -114,7 +112,7 @@ impl ChainSettings {
 
     /// Delay from the drive to the sensors, in units of 1/omega0, for samples `step` apart: on average, a held sample lags by half a
     /// sample.
-    pub fn total_delay(&self, step: f64) -> f64 {
+    pub(crate) fn total_delay(&self, step: f64) -> f64 {
         let held = if self.hold { 0.5 } else { 0.0 };
         (f64::from(self.delay) + held) * step + self.filter_delay()
     }
@@ -125,53 +123,5 @@ impl ChainSettings {
             let x = 1.0 / cut_off;
             (std::f64::consts::SQRT_2 * x).atan2(1.0 - x * x)
         })
-    }
-
-    /// Checks the keys; `units`: of the readings of response and reference.
-    pub(super) fn check(&self, controller: &ControllerSettings, units: [&'static str; 2]) -> Result<(), SceneError> {
-        for (key, bits) in [("chain.adc_bits", self.adc_bits), ("chain.dac_bits", self.dac_bits)] {
-            within(key, bits.unwrap_or(1).into(), "bits", [1.0, 32.0])?;
-        }
-        check(
-            "chain.dac_bits",
-            self.dac_bits.unwrap_or(0).into(),
-            "bits",
-            self.dac_bits.is_none() || self.hold,
-            "needs chain.hold = true: only samples of the drive can be quantised",
-        )?;
-        positive("chain.response_range", self.response_range, "(over b)")?;
-        positive("chain.base_range", self.base_range, "(over b epsilon)")?;
-        within("chain.snr", self.snr.unwrap_or(0.0), "dB", [-40.0, 300.0])?;
-        not_negative("chain.response_noise", self.response_noise.unwrap_or(0.0), units[0])?;
-        let of_reference = self.reference_noise;
-        not_negative("chain.reference_noise", of_reference.unwrap_or(0.0), units[1])?;
-        check(
-            "chain.reference_noise",
-            of_reference.unwrap_or(0.0),
-            units[1],
-            of_reference.is_none() || self.reference,
-            "needs chain.reference = true: no sensor reads the reference",
-        )?;
-        // Up to half the sampling frequency.
-        let nyquist = 0.5 * controller.samples_per_period;
-        within(
-            "chain.filter",
-            self.filter.unwrap_or(nyquist),
-            "(omega0)",
-            [2.0, nyquist],
-        )?;
-        within("chain.jitter", self.jitter, "samples", [0.0, 0.1])?;
-        // As the controller checks it; here the keys of a scene are at hand.
-        let longest = controller.samples_per_period / (TAU * controller.bandwidth);
-        check(
-            "chain.delay",
-            self.delay.into(),
-            "samples",
-            f64::from(self.delay) <= longest,
-            format!(
-                "must be at most {longest:.0}: the detector of the bandwidth {} omega0 lags by as much; lower controller.bandwidth",
-                controller.bandwidth
-            ),
-        )
     }
 }

@@ -14,7 +14,8 @@ use vines_model::ArgumentError;
 use crate::knowledge::Knowledge;
 use crate::linear::LinearResponse;
 
-use super::{Measurand, Scene, SceneError, check, given, positive, within};
+use super::checks::{Range, Row};
+use super::{Measurand, Scene, SceneError, given};
 
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -37,12 +38,17 @@ settings! {
 /// # Errors
 /// A magnitude of pi or less, or of 180 degrees or more.
 pub fn phase_target(key: &'static str, value: f64) -> Result<(), SceneError> {
+    Row::new(key, value, "degrees", in_degrees(value)).check()
+}
+
+/// What is allowed of a phase target, degrees.
+pub(super) fn in_degrees(value: f64) -> Range {
     let in_rad = match value.abs() > PI {
         true => String::new(),
         false => format!(". If it is in rad, write {:.4}", value.to_degrees()),
     };
     let allowed = format!("must be in degrees, above pi in magnitude and below 180; -90 is phase resonance{in_rad}");
-    check(key, value, "degrees", value.abs() > PI && value.abs() < 180.0, allowed)
+    Range::If(value.abs() > PI && value.abs() < 180.0, allowed)
 }
 
 impl ControllerSettings {
@@ -59,29 +65,9 @@ impl ControllerSettings {
         self.detector().bandwidth_max()
     }
 
-    pub(super) fn check(&self) -> Result<(), SceneError> {
-        positive("controller.omega_min", self.omega_min, "(omega0)")?;
-        // Two samples per period of the highest harmonic at omega_max.
-        let fewest = (2.0 * self.detector().highest_harmonic() as f64 * self.omega_max).floor() + 1.0;
-        let samples = self.samples_per_period;
-        within("controller.samples_per_period", samples, "(samples)", [fewest, 1e5])?;
-        let widest = self.bandwidth_max();
-        check(
-            "controller.bandwidth",
-            self.bandwidth,
-            "(omega0)",
-            self.bandwidth > 0.0 && self.bandwidth <= widest,
-            format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
-        )?;
-        let (low, high) = (self.omega_min, self.omega_max);
-        check(
-            "controller.omega_max",
-            high,
-            "(omega0)",
-            high > low,
-            format!("must be above omega_min = {low}"),
-        )?;
-        phase_target("controller.phase_target", self.phase_target)
+    /// Fewest samples per period: two of the highest harmonic at omega_max.
+    pub(super) fn fewest_samples(&self) -> f64 {
+        (2.0 * self.detector().highest_harmonic() as f64 * self.omega_max).floor() + 1.0
     }
 }
 

@@ -126,7 +126,7 @@ impl Structure {
     }
 
     /// Shape of a mode at the cavity, 1/sqrt(kg).
-    pub fn at_cavity(&self, mode: &StructureMode) -> f64 {
+    pub(crate) fn at_cavity(&self, mode: &StructureMode) -> f64 {
         mode.shape[self.cavity]
     }
 
@@ -425,64 +425,16 @@ impl StructureSection {
     }
 
     fn checked(self, folder: &Path) -> Result<Structure, String> {
-        let forms = [
-            !self.modes.is_empty(),
-            self.c.is_some() || self.k.is_some(),
-            self.residues.is_some(),
-        ];
-        let parts = match forms {
-            [true, false, false] => self.of_modes(folder)?,
-            [false, true, false] => self.of_matrices(folder)?,
-            [false, false, true] => self.of_residues(folder)?,
-            _ => {
-                return Err(
-                    "give exactly one description: `modes`, the matrices `M`, `C` and `K`, or `residues` (one oscillator is [plant], and what is mounted on it \
-                     belongs to its M)"
-                        .into(),
-                );
-            }
-        };
+        let parts = self.parts(folder)?;
         let points = parts.points.clone();
-        let place = |key: &str, name: &str| {
-            points.iter().position(|point| point == name).ok_or_else(|| {
-                format!(
-                    "{key} = \"{name}\" is no point of the structure; its points are {}",
-                    points.join(", ")
-                )
-            })
-        };
-        let required = |key: &str, name: &Option<String>| match name {
-            Some(name) => place(key, name),
-            None => Err(format!(
-                "`{key}` is missing: give one of the points {}",
-                points.join(", ")
-            )),
-        };
-        let cavity = required("cavity", &self.cavity)?;
-        let drive = match (self.excitation, &self.drive) {
-            (Excitation::Force, name) => Some(required("drive", name)?),
-            (Excitation::Base, None) => None,
-            (Excitation::Base, Some(name)) => {
-                return Err(format!(
-                    "drive = \"{name}\" with excitation = \"base\": a base moves all supports; drop it, or take excitation = \"force\""
-                ));
-            }
-        };
-        let sensor = self.sensor.as_ref().map(|name| place("sensor", name)).transpose()?;
-        let sensor = sensor.or(drive).unwrap_or(cavity);
-        let mounted = |(name, mass): (&String, &f64)| match *mass {
-            mass if mass > 0.0 && mass.is_finite() => Ok((place("masses", name)?, mass)),
-            mass => Err(format!(
-                "masses has {mass} kg at {name}; a mass mounted on a point must be positive and finite"
-            )),
-        };
-        let masses: Vec<_> = self.masses.iter().map(mounted).collect::<Result<_, _>>()?;
+        let at = self.places(&points)?;
+        let masses = self.mounted(&points)?;
         let omega_without_masses = match masses.is_empty() {
             true => Vec::new(),
             false => parts.modes.iter().map(|mode| mode.omega).collect(),
         };
         let Parts { mut modes, coupled, .. } = parts.loaded(&masses)?;
-        if let Some(drive) = drive {
+        if let Some(drive) = at.drive {
             modes.iter_mut().for_each(|mode| mode.drive = mode.shape[drive]);
         }
         let driven = self.mode.unwrap_or(1);
@@ -493,13 +445,13 @@ impl StructureSection {
             ));
         }
         let driven = driven - 1;
-        let at = Places { cavity, drive, sensor };
         check(&points, &modes, driven, &at)?;
         let (equations, coordinates) = equations(&modes, coupled.as_ref(), &at, points.len());
         let host = equations
             .host(self.excitation.of_host())
             .map_err(|error| error.to_string())?;
         let rows = rows(&host, &coordinates)?;
+        let Places { cavity, drive, sensor } = at;
         Ok(Structure {
             excitation: self.excitation,
             points,
@@ -516,6 +468,64 @@ impl StructureSection {
             omega_without_masses,
             shaker: None,
         })
+    }
+
+    /// Points and modes, by the one description that is given.
+    fn parts(&self, folder: &Path) -> Result<Parts, String> {
+        let forms = [
+            !self.modes.is_empty(),
+            self.c.is_some() || self.k.is_some(),
+            self.residues.is_some(),
+        ];
+        match forms {
+            [true, false, false] => self.of_modes(folder),
+            [false, true, false] => self.of_matrices(folder),
+            [false, false, true] => self.of_residues(folder),
+            _ => Err(
+                "give exactly one description: `modes`, the matrices `M`, `C` and `K`, or `residues` (one oscillator is [plant], and what is mounted on it \
+                 belongs to its M)"
+                    .into(),
+            ),
+        }
+    }
+
+    /// Where cavity, force and sensor are.
+    fn places(&self, points: &[String]) -> Result<Places, String> {
+        let required = |key: &str, name: &Option<String>| match name {
+            Some(name) => place(points, key, name),
+            None => Err(format!(
+                "`{key}` is missing: give one of the points {}",
+                points.join(", ")
+            )),
+        };
+        let cavity = required("cavity", &self.cavity)?;
+        let drive = match (self.excitation, &self.drive) {
+            (Excitation::Force, name) => Some(required("drive", name)?),
+            (Excitation::Base, None) => None,
+            (Excitation::Base, Some(name)) => {
+                return Err(format!(
+                    "drive = \"{name}\" with excitation = \"base\": a base moves all supports; drop it, or take excitation = \"force\""
+                ));
+            }
+        };
+        let sensor = self
+            .sensor
+            .as_ref()
+            .map(|name| place(points, "sensor", name))
+            .transpose()?;
+        let sensor = sensor.or(drive).unwrap_or(cavity);
+        Ok(Places { cavity, drive, sensor })
+    }
+
+    /// The masses, kg, and the places of their points.
+    fn mounted(&self, points: &[String]) -> Result<Vec<(usize, f64)>, String> {
+        let mounted = |(name, mass): (&String, &f64)| match *mass {
+            mass if mass > 0.0 && mass.is_finite() => Ok((place(points, "masses", name)?, mass)),
+            mass => Err(format!(
+                "masses has {mass} kg at {name}; a mass mounted on a point must be positive and finite"
+            )),
+        };
+        self.masses.iter().map(mounted).collect()
     }
 
     /// The modes of a table.
@@ -709,6 +719,16 @@ struct Places {
     cavity: usize,
     drive: Option<usize>,
     sensor: usize,
+}
+
+/// The place of a point among the points; `key` names it in messages.
+fn place(points: &[String], key: &str, name: &str) -> Result<usize, String> {
+    points.iter().position(|point| point == name).ok_or_else(|| {
+        format!(
+            "{key} = \"{name}\" is no point of the structure; its points are {}",
+            points.join(", ")
+        )
+    })
 }
 
 /// Refuses a driven mode that no impact or drive can reach, that the sensor does not see, or that does not oscillate.

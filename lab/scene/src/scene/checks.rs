@@ -1,0 +1,383 @@
+//! What is allowed of a scene: the ranges of its keys, one row a key, and the rules that join keys.
+//!
+//! The first row that refuses is reported, then the first rule: the order of both lists is the order in which they are asked. A limit that follows from
+//! another key stands below this key.
+
+use std::f64::consts::TAU;
+
+use lovines::{Drive, Plant, State, StructureState};
+
+use super::controller::in_degrees;
+use super::{Excitation, Measurand, Reference, Scene, SceneError, Sensor, Structure};
+
+/// What is allowed of a number, which must be finite.
+pub(super) enum Range {
+    Positive,
+    NotNegative,
+    Within([f64; 2]),
+    /// Limits that follow from other keys: whether they allow the value, and what is allowed.
+    If(bool, String),
+}
+
+/// The value of a key, in its unit, and what is allowed; without a value everything is.
+pub(super) struct Row {
+    key: &'static str,
+    value: Option<f64>,
+    unit: &'static str,
+    range: Range,
+}
+
+impl Row {
+    pub(super) fn new(key: &'static str, value: impl Into<Option<f64>>, unit: &'static str, range: Range) -> Self {
+        Self { key, value: value.into(), unit, range }
+    }
+
+    /// Refuses a value that is not allowed.
+    pub(super) fn check(self) -> Result<(), SceneError> {
+        let Self { key, value: Some(value), unit, range } = self else {
+            return Ok(());
+        };
+        let (is_allowed, allowed) = match range {
+            Range::Positive => (value > 0.0, "must be positive and finite".into()),
+            Range::NotNegative => (value >= 0.0, "must be zero or positive, and finite".into()),
+            Range::Within([low, high]) => ((low..=high).contains(&value), format!("must be from {low} to {high}")),
+            Range::If(is_allowed, allowed) => (is_allowed, allowed),
+        };
+        match is_allowed && value.is_finite() {
+            true => Ok(()),
+            false => Err(SceneError::Value { key, value, unit, allowed }),
+        }
+    }
+}
+
+/// Refuses a scene that no bench can run; `origin` names it in messages.
+pub(super) fn check(scene: &Scene, origin: &str) -> Result<(), SceneError> {
+    ROWS.iter().try_for_each(|row| row(scene).check())?;
+    if let Some(message) = RULES.iter().find_map(|rule| rule(scene)) {
+        return Err(SceneError::text(origin, message));
+    }
+    let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
+    Drive::harmonic(scene.amplitude, fastest)
+        .validate()
+        .map_err(SceneError::Drive)
+}
+
+// Ranges.
+
+use Range::{If, NotNegative, Positive, Within};
+
+/// Most samples of one record: about 3 GiB in memory.
+const MOST_SAMPLES: f64 = 2e7;
+
+/// Rows of a scene: key = value, unit, what is allowed.
+macro_rules! rows {
+    ($scene:ident: $($key:literal = $value:expr, $unit:expr, $range:expr;)*) => {
+        &[$(|$scene| Row::new($key, $value, $unit, $range)),*]
+    };
+}
+
+/// The keys of all sections with numbers of their own. (The plant has a table of its own, and so has the controller.)
+const ROWS: &[fn(&Scene) -> Row] = rows! { s:
+    "controller.omega_min" = s.controller.omega_min, "(omega0)", Positive;
+    "controller.omega_max" = s.controller.omega_max, "(omega0)", above_omega_min(s);
+    "controller.samples_per_period" = s.controller.samples_per_period, "(samples)", sampled(s);
+    "controller.bandwidth" = s.controller.bandwidth, "(omega0)", as_sampled(s);
+    "controller.phase_target" = s.controller.phase_target, "degrees", in_degrees(s.controller.phase_target);
+    "backbone.C_from" = s.backbone.c_from, "(over b)", Positive;
+    "backbone.C_to" = s.backbone.c_to, "(over b)", Positive;
+    "backbone.precision" = s.backbone.precision, "(relative)", Positive;
+    "backbone.points" = f64::from(s.backbone.points), "(levels)", Within([1.0, 1e4]);
+    // At least enough to count impacts and measure.
+    "record.hold_periods" = s.record.hold_periods, "(natural periods)", Within([3.0, 1e6]);
+    "record.decay_periods" = s.record.decay_periods, "(natural periods)", Positive;
+    "samples of phase_lock.acquire_timeout and of all periods of [record]" = samples_of_record(s), "samples", in_memory(s);
+    "chain.adc_bits" = s.chain.adc_bits.map(f64::from), "bits", Within([1.0, 32.0]);
+    "chain.dac_bits" = s.chain.dac_bits.map(f64::from), "bits", Within([1.0, 32.0]);
+    "chain.dac_bits" = s.chain.dac_bits.map(f64::from), "bits", with_hold(s);
+    "chain.response_range" = s.chain.response_range, "(over b)", Positive;
+    "chain.base_range" = s.chain.base_range, "(over b epsilon)", Positive;
+    "chain.base_range" = s.chain.base_range, "(over b epsilon)", above_drive(s);
+    "chain.snr" = s.chain.snr, "dB", Within([-40.0, 300.0]);
+    "chain.response_noise" = s.chain.response_noise, s.reading_units()[0], NotNegative;
+    "chain.reference_noise" = s.chain.reference_noise, s.reading_units()[1], NotNegative;
+    "chain.reference_noise" = s.chain.reference_noise, s.reading_units()[1], with_sensor(s);
+    // Up to half the sampling frequency.
+    "chain.filter" = s.chain.filter, "(omega0)", Within([2.0, 0.5 * s.controller.samples_per_period]);
+    "chain.jitter" = s.chain.jitter, "samples", Within([0.0, 0.1]);
+    "chain.delay" = f64::from(s.chain.delay), "samples", as_detected(s);
+};
+
+fn above_omega_min(scene: &Scene) -> Range {
+    let [low, high] = [scene.controller.omega_min, scene.controller.omega_max];
+    If(high > low, format!("must be above omega_min = {low}"))
+}
+
+fn sampled(scene: &Scene) -> Range {
+    Within([scene.controller.fewest_samples(), 1e5])
+}
+
+fn as_sampled(scene: &Scene) -> Range {
+    let (samples, widest) = (scene.controller.samples_per_period, scene.controller.bandwidth_max());
+    let allowed = format!("must be above 0 and at most {widest:.3} with {samples} samples per period");
+    let bandwidth = scene.controller.bandwidth;
+    If(bandwidth > 0.0 && bandwidth <= widest, allowed)
+}
+
+fn samples_of_record(scene: &Scene) -> f64 {
+    let periods = scene.record.hold_periods + scene.record.decay_periods.unwrap_or(0.0);
+    let longest = scene.controller_config().acquire_timeout.unwrap_or(f64::INFINITY);
+    (longest / scene.sample_time()).round() + scene.controller.samples_per_period * periods
+}
+
+fn in_memory(scene: &Scene) -> Range {
+    If(
+        samples_of_record(scene) <= MOST_SAMPLES,
+        "must be at most 20 million".into(),
+    )
+}
+
+fn with_hold(scene: &Scene) -> Range {
+    let allowed = "needs chain.hold = true: only samples of the drive can be quantised";
+    If(scene.chain.hold, allowed.into())
+}
+
+fn above_drive(scene: &Scene) -> Range {
+    let drive = scene.dimensionless().g;
+    let allowed = format!("must be at least G = {drive:.6}, or the converter of the base saturates");
+    If(scene.amplitude <= scene.drive_range(), allowed)
+}
+
+fn with_sensor(scene: &Scene) -> Range {
+    let allowed = "needs chain.reference = true: no sensor reads the reference";
+    If(scene.chain.reference, allowed.into())
+}
+
+/// As the controller checks it; here the keys of a scene are at hand.
+fn as_detected(scene: &Scene) -> Range {
+    let bandwidth = scene.controller.bandwidth;
+    let longest = scene.controller.samples_per_period / (TAU * bandwidth);
+    let allowed = format!(
+        "must be at most {longest:.0}: the detector of the bandwidth {bandwidth} omega0 lags by as much; lower controller.bandwidth"
+    );
+    If(f64::from(scene.chain.delay) <= longest, allowed)
+}
+
+// Rules.
+
+/// Why a scene is refused, and what to do.
+type Rule = fn(&Scene) -> Option<String>;
+
+/// What joins keys of several sections.
+const RULES: [Rule; 10] = [
+    mode_without_cavity,
+    start_beyond_structure,
+    second_reference,
+    shaker_without_reference,
+    drive_beyond_shaker,
+    force_without_sensor,
+    quantity_of_v,
+    quantity_of_calculated_force,
+    quantity_of_shaker_force,
+    quantity_without_sensor,
+];
+
+/// No impact moves a mode whose node is at the cavity.
+fn mode_without_cavity(scene: &Scene) -> Option<String> {
+    let structure = scene.structure.as_ref()?;
+    let error = structure.reached_by(scene.plant.particle_mass).err()?;
+    Some(format!("[structure]: {error}"))
+}
+
+/// The plant takes the structure with the particle at its start.
+fn start_beyond_structure(scene: &Scene) -> Option<String> {
+    let structure = scene.structure.as_ref()?;
+    let State { q2, dq2, .. } = scene.start;
+    let start = StructureState { q2, dq2, ..StructureState::default() };
+    let error = Plant::with_host(structure.host.clone(), scene.plant, &start).err()?;
+    Some(format!("[structure]: {error}"))
+}
+
+/// The reference of a structure is what excites it.
+fn second_reference(scene: &Scene) -> Option<String> {
+    let is_second = scene.structure.is_some() && scene.resonance.reference == Reference::Force;
+    is_second.then(|| {
+        "resonance.reference = \"force\" beside [structure]: its `excitation` is the reference; drop the key".into()
+    })
+}
+
+/// The phase of a shaker's command turns near the resonance.
+fn shaker_without_reference(scene: &Scene) -> Option<String> {
+    if scene.chain.reference {
+        return None;
+    }
+    let turn = scene.structure.as_ref()?.shaker_path()?.turn().to_degrees();
+    Some(format!(
+        "[shaker] with chain.reference = false: the drive's phase turns by {turn:.1} degrees within the half-power bandwidth; the loop \
+         needs the force cell, or the sensor of the table, as its reference"
+    ))
+}
+
+/// The limits of a shaker allow the drive at the least response at which particles hit: half of the cavity.
+fn drive_beyond_shaker(scene: &Scene) -> Option<String> {
+    let structure = scene.structure.as_ref()?;
+    structure.beyond_limits(scene.amplitude, 0.5 * scene.plant.half_width)
+}
+
+/// A force of spring and damper is calculated from what the base sensor reads.
+fn force_without_sensor(scene: &Scene) -> Option<String> {
+    let is_unread = scene.resonance.reference == Reference::Force && !scene.chain.reference;
+    is_unread.then(|| {
+        "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
+         sensor; switch it on, or take the reference \"base\""
+            .into()
+    })
+}
+
+/// The name of a quantity other than the displacement.
+fn derivative(quantity: Measurand) -> Option<&'static str> {
+    (quantity != Measurand::Displacement).then(|| quantity.name())
+}
+
+/// No sensor on the structure reads what contains the particle.
+fn quantity_of_v(scene: &Scene) -> Option<String> {
+    let name = derivative(scene.resonance.sensor_quantity)?;
+    (scene.resonance.sensor == Sensor::V).then(|| {
+        format!(
+            "resonance.sensor_quantity = \"{name}\" with resonance.sensor = \"v\": v contains the particle, which no sensor on the structure \
+             reads; set resonance.sensor = \"q1\""
+        )
+    })
+}
+
+/// A force of spring and damper is calculated from the displacement of the base.
+fn quantity_of_calculated_force(scene: &Scene) -> Option<String> {
+    let name = derivative(scene.resonance.reference_quantity)?;
+    (scene.resonance.reference == Reference::Force).then(|| {
+        format!(
+            "resonance.reference_quantity = \"{name}\" with resonance.reference = \"force\": the force k e + c e' follows from the displacement of \
+             the base; take the reference \"base\", or the quantity \"displacement\""
+        )
+    })
+}
+
+/// A force cell reads a force.
+fn quantity_of_shaker_force(scene: &Scene) -> Option<String> {
+    let name = derivative(scene.resonance.reference_quantity)?;
+    let is_force = |one: &Structure| one.excitation == Excitation::Force;
+    scene.structure.as_ref().is_some_and(is_force).then(|| {
+        format!(
+            "resonance.reference_quantity = \"{name}\" where a force drives the structure: the reference is this force; drop the key, which belongs to \
+             a base"
+        )
+    })
+}
+
+/// Without a sensor, the reference is the displacement that is commanded.
+fn quantity_without_sensor(scene: &Scene) -> Option<String> {
+    let name = derivative(scene.resonance.reference_quantity)?;
+    (!scene.chain.reference).then(|| {
+        format!(
+            "resonance.reference_quantity = \"{name}\" with chain.reference = false: no sensor reads the base, and the reference is the displacement \
+             that is commanded; drop one of the keys"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// The rule refuses the scene with these settings, in these words, and not without the last of them.
+    fn refuses(rule: Rule, scene: &str, settings: &[&str], words: &str) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(scene);
+        let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
+        let message = Scene::load(Some(&path), &settings).unwrap_err().to_string();
+        assert!(message.contains(words), "`{words}` is not in: {message}");
+        let without = Scene::load(Some(&path), &settings[..settings.len() - 1]).unwrap();
+        assert_eq!(rule(&without), None);
+    }
+
+    #[test]
+    fn a_structure_has_one_reference_and_takes_the_start_of_its_particle() {
+        let reference = ["resonance.reference=force"];
+        refuses(second_reference, "cantilever.toml", &reference, "drop the key");
+        let start = ["start.dq2=1e200"];
+        refuses(start_beyond_structure, "cantilever.toml", &start, "1e200");
+    }
+
+    #[test]
+    fn a_mode_with_its_node_at_the_cavity_is_refused() {
+        let light = ["plant.m=1e-12"];
+        refuses(
+            mode_without_cavity,
+            "cantilever.toml",
+            &light,
+            "at a node of the driven mode",
+        );
+    }
+
+    #[test]
+    fn a_shaker_needs_its_reference_and_reaches_the_drive() {
+        let unread = ["chain.reference=false"];
+        refuses(
+            shaker_without_reference,
+            "shaker-oscillator.toml",
+            &unread,
+            "needs the force cell",
+        );
+        let strong = ["excitation.G=1000"];
+        refuses(
+            drive_beyond_shaker,
+            "shaker-oscillator.toml",
+            &strong,
+            "lower the drive",
+        );
+    }
+
+    #[test]
+    fn a_force_that_is_calculated_needs_the_displacement_of_the_base() {
+        let unread = ["resonance.reference=force", "chain.reference=false"];
+        refuses(force_without_sensor, "paper.toml", &unread, "switch it on");
+        let velocity = ["resonance.reference=force", "resonance.reference_quantity=velocity"];
+        refuses(
+            quantity_of_calculated_force,
+            "paper.toml",
+            &velocity,
+            "take the reference \"base\"",
+        );
+    }
+
+    #[test]
+    fn a_derivative_needs_a_sensor_that_reads_it() {
+        let of_v = ["resonance.sensor_quantity=velocity"];
+        refuses(quantity_of_v, "paper.toml", &of_v, "set resonance.sensor");
+        let of_force = ["resonance.reference_quantity=velocity"];
+        refuses(
+            quantity_of_shaker_force,
+            "shaker-oscillator.toml",
+            &of_force,
+            "drop the key",
+        );
+        let unread = ["chain.reference=false", "resonance.reference_quantity=velocity"];
+        refuses(
+            quantity_without_sensor,
+            "paper.toml",
+            &unread,
+            "no sensor reads the base",
+        );
+    }
+
+    #[test]
+    fn of_two_keys_that_are_refused_the_upper_row_is_reported_and_rows_before_rules() {
+        let settings = [
+            "chain.jitter=1",
+            "backbone.precision=0",
+            "resonance.sensor_quantity=velocity",
+        ];
+        let settings = settings.map(|one| one.parse().unwrap());
+        let message = Scene::load(None, &settings).unwrap_err().to_string();
+        assert!(message.starts_with("backbone.precision = 0"), "{message}");
+    }
+}
