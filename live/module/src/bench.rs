@@ -306,7 +306,7 @@ impl Controller for Requested<'_> {
 
 /// Relaxations of the linear response after which a motion has its regime, and periods after which it is not waited for.
 const RELAXATIONS: f64 = 6.0;
-const LONGEST: f64 = 1000.0;
+const MOST_PERIODS: f64 = 1000.0;
 
 /// The regime under a constant drive of detuning `sigma` and excitation `g`, from the start of the scene.
 ///
@@ -319,7 +319,7 @@ pub fn regime_at(scene: &Scene, sigma: f64, g: f64) -> Result<Regime, Message> {
     let mut plant = Plant::new(scene.plant, scene.start)?;
     let mut impacts = LastImpacts::default();
     // The amplitude relaxes by e in 1/(pi epsilon lambda) periods.
-    let periods = (RELAXATIONS / (PI * d.epsilon * d.lambda)).min(LONGEST) as usize;
+    let periods = (RELAXATIONS / (PI * d.epsilon * d.lambda)).min(MOST_PERIODS) as usize;
     for n in 0..periods {
         let mut count = |event: Event| {
             if let Event::Impact { t, velocity, .. } = event {

@@ -82,7 +82,7 @@ const EXCESS: f64 = 2.0;
 /// level.
 const SLOPE: f64 = 0.5;
 /// Periods after which a level is taken, settled or not.
-pub(crate) const LONGEST: usize = 150;
+pub(crate) const LONGEST_SETTLING: usize = 150;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 

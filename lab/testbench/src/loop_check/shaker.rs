@@ -11,8 +11,8 @@ use num_complex::Complex64;
 use vines_model::numerics::complex_fit;
 
 use super::{
-    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NOTED, OpenLoop, PHASE, ROUNDS, Verdict, fitted,
-    of_response, quantity,
+    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NEWTON_STEPS, NOTED, OpenLoop, PHASE, Verdict,
+    fitted, of_response, quantity,
 };
 use crate::linear::LinearResponse;
 use crate::linear::ParticleState;
@@ -22,9 +22,9 @@ use crate::scene::{PLACES, frequencies};
 use crate::shaker_path::ShakerPath;
 
 /// Periods of a window, and most windows at a frequency.
-const WINDOW: [usize; 2] = [8, 100];
+const STEADY_WINDOW: [usize; 2] = [8, 100];
 /// Largest relative change from window to window of a steady motion.
-const STEADY: f64 = 1e-4;
+const STEADY_CHANGE: f64 = 1e-4;
 
 /// Largest relative error of the model of reference over command. The control is stable below 1 (small gain: its closed loop is at most 1); half of
 /// it is a gain margin of 2.
@@ -42,15 +42,15 @@ pub(super) fn check(
     let mut periods = 0.0;
     let mut scaled = Scaled::new(rig, target);
     let mut rig = OpenLoop::new(&mut scaled, target, plan.knowledge.sample_time);
-    let window = |omega: f64| (WINDOW[0] as f64 * TAU / (omega * plan.knowledge.sample_time)).round() as usize;
+    let window = |omega: f64| (STEADY_WINDOW[0] as f64 * TAU / (omega * plan.knowledge.sample_time)).round() as usize;
     // Response and reference at the end of two windows, their noise, and the frequency, which is complex while the response still changes.
     let mut steady = |omega: f64| -> Result<(Complex64, [Complex64; 2], [f64; 2]), RigError> {
         let (mut last, mut before) = ([Complex64::ZERO; 2], [Complex64::ZERO; 2]);
         let mut noise = [0.0; 2];
-        for _ in 0..WINDOW[1] {
+        for _ in 0..STEADY_WINDOW[1] {
             rig.readings.clear();
             rig.drive(window(omega), omega, amplitude)?;
-            periods += WINDOW[0] as f64;
+            periods += STEADY_WINDOW[0] as f64;
             // A heavy table on the suspension of a light armature floats for hundreds of periods: a parabola in a window.
             let both = [1, 2].map(|channel| fitted(&rig.readings, channel, 2, &target, omega));
             let change = (0..2)
@@ -58,7 +58,7 @@ pub(super) fn check(
                 .fold(0.0, f64::max);
             (before, last, noise) = (last, both.map(|(phasor, _)| phasor), both.map(|(_, rest)| rest));
             // A reading that is no number never settles.
-            if change < STEADY || change.is_nan() {
+            if change < STEADY_CHANGE || change.is_nan() {
                 break;
             }
         }
@@ -72,7 +72,7 @@ pub(super) fn check(
     for omega in frequencies {
         all.push(steady(omega)?);
     }
-    rig.end(window(linear.omega0) / WINDOW[0])?;
+    rig.end(window(linear.omega0) / STEADY_WINDOW[0])?;
     let near = &all[..PLACES.len()];
     let (_, at, noise) = near[PLACES.len() / 2];
     // The curve of R/D.
@@ -91,7 +91,7 @@ pub(super) fn check(
         .unwrap_or_else(|| (Vector3::from_element(nothing), Matrix3::from_element(nothing)));
     let slope_at = |at: Complex64| RowVector3::new(Complex64::ZERO, Complex64::ONE, 2.0 * at);
     let mut root = -found[0] / found[1];
-    for _ in 0..ROUNDS {
+    for _ in 0..NEWTON_STEPS {
         root -= (row(root) * found)[0] / (slope_at(root) * found)[0];
     }
     let rest: f64 = rows
@@ -121,7 +121,7 @@ pub(super) fn check(
     let response = LinearResponse {
         omega0: natural,
         damping_rate: damping,
-        uncertainty: u_rate.max(NOTED[0] * STEADY * natural),
+        uncertainty: u_rate.max(NOTED[0] * STEADY_CHANGE * natural),
         gain: Complex64::new(damping / natural, 1.0) / slope,
         u_gain,
         particle: ParticleState::Unknown,
@@ -157,7 +157,7 @@ pub(super) fn check(
         quantity(
             "reference over command, largest relative error of its model",
             "",
-            [path.error(natural, &values), STEADY, 0.0],
+            [path.error(natural, &values), STEADY_CHANGE, 0.0],
             ROBUST,
             Some(Verdict::ShakerResonance),
         ),
@@ -197,7 +197,7 @@ fn noted(name: &'static str, unit: &'static str, measured: f64, expected: f64, t
     quantity(
         name,
         unit,
-        [measured, STEADY * measured.abs(), expected],
+        [measured, STEADY_CHANGE * measured.abs(), expected],
         tolerance,
         None,
     )

@@ -12,12 +12,12 @@ use num_complex::Complex64;
 
 use super::{Drive, RigError};
 use crate::knowledge::{Knowledge, Target};
-use crate::shaker_path::{BANDWIDTH, DETECTOR, HARMONICS, OBSERVER, SECOND, ShakerPath, rate_of};
+use crate::shaker_path::{BANDWIDTH, DETECTOR, OBSERVER, ODD_HARMONICS, SECOND, ShakerPath, rate_of};
 
 /// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
 /// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
 /// asked for that is left then. And a reference that never reaches this share is not there, of a broken stinger.
-const SHARE: f64 = 0.25;
+const LOST_SHARE: f64 = 0.25;
 /// Phase for which such an error lasts, rad: in this time the control halves an error. Impacts and drive change the reference all the time while the
 /// controller searches, where little of it is left.
 pub(crate) const OFF: f64 = LN_2 / BANDWIDTH;
@@ -26,15 +26,15 @@ pub(crate) const OFF: f64 = LN_2 / BANDWIDTH;
 #[derive(Debug, Clone, Default)]
 struct Detector {
     offset: f64,
-    phasors: [Complex64; HARMONICS],
+    phasors: [Complex64; ODD_HARMONICS],
 }
 
 impl Detector {
     /// Takes a reading at a phase of the oscillator, which turns by `turn` from sample to sample, rad.
     fn take(&mut self, reading: f64, phase: f64, turn: f64, share: f64) {
         let sampled = (0.5 * (PI / turn + 1.0)) as usize;
-        let (first, mut rotors) = (Complex64::cis(phase), [Complex64::ZERO; HARMONICS]);
-        (0..sampled.min(HARMONICS)).fold(first, |rotor, n| {
+        let (first, mut rotors) = (Complex64::cis(phase), [Complex64::ZERO; ODD_HARMONICS]);
+        (0..sampled.min(ODD_HARMONICS)).fold(first, |rotor, n| {
             rotors[n] = rotor;
             rotor * first * first
         });
@@ -130,11 +130,14 @@ impl ReferenceControl {
         }
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
-        let largest = self.asked * (SHARE / self.path.drop_out()).min(1.0);
+        let largest = self.asked * (LOST_SHARE / self.path.drop_out()).min(1.0);
         let is_driven = self.asked > 0.0 && amplitude > 0.0;
         let longer = |phase: f64, is: bool| if is && is_driven { phase + omega * step } else { 0.0 };
         self.off = longer(self.off, error.norm() > largest || self.times > 1.0);
-        self.quiet = longer(self.quiet, reading.abs() * displacement.norm() < SHARE * self.asked);
+        self.quiet = longer(
+            self.quiet,
+            reading.abs() * displacement.norm() < LOST_SHARE * self.asked,
+        );
         self.contradicted = longer(self.contradicted, self.correction.norm() > self.asked);
         let longest = OFF / self.path.speed;
         let unit = ["m", "N"][usize::from(self.path.by_force)];

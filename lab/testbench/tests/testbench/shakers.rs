@@ -10,7 +10,7 @@ use vines_model::orbit::StructureOrbit;
 use vines_testbench::backbone::track;
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{ExperimentError, run};
-use vines_testbench::identification::{DecayEnd, DecayPoints, Regime, WINDOW, decay_points, identify};
+use vines_testbench::identification::{DECAY_WINDOW, DecayEnd, DecayPoints, Regime, decay_points, identify};
 use vines_testbench::loop_check::{Verdict, check};
 use vines_testbench::plan::Plan;
 use vines_testbench::record::Record;
@@ -665,7 +665,7 @@ fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
     let scene = preset(1, &[("[shaker]", "[shaker]\nrelease = \"cut\"")]).unwrap();
     let record = record_of(&scene);
     let truth = demodulated(&record, &scene);
-    let points = decay_points(&record, &scene.knowledge(), WINDOW).points;
+    let points = decay_points(&record, &scene.knowledge(), DECAY_WINDOW).points;
     let errors = points.iter().filter(|point| point.c > COMPARED_ABOVE);
     let errors: Vec<f64> = errors
         .filter_map(|point| Some(point.sigma - at(&truth, point.tau)?))
@@ -682,11 +682,11 @@ fn a_decay_beside_a_mode_that_a_window_cannot_tell_apart_has_no_points() {
     let open = preset(2, &[("amplifier = \"voltage\"", "amplifier = \"current\"")]).unwrap();
     let apart = open.knowledge().nearest_pole;
     assert!((apart - 20.372).abs() < 1e-3, "{apart}");
-    let DecayPoints { points, end } = decay_points(&record_of(&open), &open.knowledge(), WINDOW);
+    let DecayPoints { points, end } = decay_points(&record_of(&open), &open.knowledge(), DECAY_WINDOW);
     assert_eq!((points.len(), end), (0, DecayEnd::OtherMode));
     // Behind a voltage the coil holds the table, whose poles are real.
     let shorted = preset(2, &[]).unwrap();
-    let DecayPoints { points, end } = decay_points(&record_of(&shorted), &shorted.knowledge(), WINDOW);
+    let DecayPoints { points, end } = decay_points(&record_of(&shorted), &shorted.knowledge(), DECAY_WINDOW);
     assert!(
         points.len() > 40 && end == DecayEnd::Synchrony,
         "{} {end:?}",
