@@ -296,7 +296,7 @@ pub struct LeastSquares<const N: usize, T> {
     pub trace: T,
 }
 
-/// Largest number of steps of [`LeastSquares::minimum`]; a fit that converges takes about twenty.
+/// Largest number of steps of [`LeastSquares::minimum`].
 const MOST_STEPS: usize = 100;
 
 impl<const N: usize, T: Clone> LeastSquares<N, T>

@@ -86,7 +86,7 @@ pub(crate) const BANDWIDTH: f64 = SECOND * DETECTOR;
 /// Number of odd harmonics that both detectors know, as far as they are sampled. Impacts of one period are alternating impulses. A resonance of armature
 /// and stinger can make a harmonic of the force ten times the fundamental: unknown, it would be in the command, and another motion the result.
 pub(crate) const ODD_HARMONICS: usize = 15;
-/// How many of them change as fast as the fundamental: chosen by trial on random shakers (studies/shakers.rs), a few of which overshoot limits with 1.
+/// How many of them change as fast as the fundamental: the strongest harmonics of impacts follow a change of the motion.
 const FAST: usize = 3;
 
 /// Rate at which a detector changes a harmonic, by its place among the odd ones, over the rate of the fundamental.

@@ -139,8 +139,7 @@ impl Bench {
     /// The message for a drive that the plant refuses.
     pub fn run(&mut self, samples: usize, mut on_row: impl FnMut(&Row)) -> Result<(), Message> {
         for left in (0..samples).rev() {
-            // Only the last sample can be looked into. A plant is large: copies of it would take a third of the time. WebAssembly
-            // copies the output in a call, too.
+            // Only the last sample can be looked into. A plant is large, and WebAssembly copies the output in a call, too.
             on_row(&self.sample(left == 0)?);
         }
         Ok(())

@@ -36,10 +36,10 @@ pub(super) struct Impact {
 /// Size of the last correction of a zero, over the larger of its modulus and 1, and, where rounding lets it fall no further, the largest.
 const ZERO_CONVERGED: f64 = 1e-13;
 const ZERO_ROUNDING: f64 = 1e-9;
-/// Largest number of rounds: about ten are needed.
+/// Largest number of rounds.
 const MOST_ROUNDS: usize = 60;
 /// Distance of the start from the zeros of `det(F + z)`, over their moduli. Exactly there, double ones would not part, and pairs could not become
-/// real. The number of rounds hardly depends on it.
+/// real.
 const START_OFFSET: f64 = 1e-3;
 
 /// The multipliers, in no order; `None` where the zeros do not converge.

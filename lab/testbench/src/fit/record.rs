@@ -68,7 +68,7 @@ const MOST_ROUNDS: usize = 30;
 const PRIOR: [f64; 2] = [0.02, 0.1];
 /// Error of the prediction, over the response, at which the plant has lost the motion.
 const MOTION_LOST: f64 = 0.5;
-/// Step of a difference, relative. A record without noise determines its best direction to 5e-8; with a step of 1e-5 the search of one ended early.
+/// Step of a difference, relative. A record without noise determines its best direction to 5e-8.
 const RECORD_DIFFERENCE: f64 = 1e-7;
 /// Step of a state, over the response: so small that hardly any impact lies between both states.
 const STATE_DIFFERENCE: f64 = 1e-7;
