@@ -207,12 +207,13 @@ impl Display for Evidence {
         if let Some(error) = self.phase_error {
             write!(f, "over the last period {}; ", phase_in_words(error))?;
         }
+        let name = ["base", "force"][usize::from(self.unit == "N")];
         if let Some(channel) = self.contradicts {
+            let channel = if channel == "reference" { name } else { channel };
             write!(f, "the {channel} contradicts its past; ")?;
         }
         write!(f, "the response read {} m", short(self.response))?;
         if let Some(reference) = self.reference {
-            let name = ["base", "force"][usize::from(self.unit == "N")];
             write!(f, ", and the {name} {} {}", short(reference), self.unit)?;
         }
         write!(f, "; in the last period at most {} m", short(self.largest))?;
@@ -810,7 +811,7 @@ fn contradicts(samples: &[Sample], sample_time: f64, drop_out: f64) -> Option<&'
     };
     let force = drop_out * change(|sensors| sensors.reference.unwrap_or(0.0));
     let is_force = force.total_cmp(&change(|sensors| sensors.response)).is_gt();
-    Some(if is_force { "force" } else { "response" })
+    Some(if is_force { "reference" } else { "response" })
 }
 
 /// Five digits, with an exponent if the number is very small or large.
@@ -883,6 +884,6 @@ mod tests {
             ]
         });
         let names = [reversed, weak, dead, not_a_number, answered];
-        assert_eq!(names, ["response", "force", "force", "response", "response"]);
+        assert_eq!(names, ["response", "reference", "reference", "response", "response"]);
     }
 }
