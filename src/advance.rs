@@ -142,7 +142,7 @@ impl<P: Primary> Plant<P> {
         let [offset, slope_now, ..] = drive.signal.map(f64::abs);
         let moved = (slope.abs() + slope_now) * self.status.time.abs();
         let size = 2.0 * offset + drive.amplitude.abs() + amplitude.abs() + moved;
-        let is_rounding = jump.abs() <= ROUNDING * size;
+        let is_rounding = jump.abs() <= ACCELERATION_ROUNDING * size;
         let acceleration = self.acceleration(self.moving.masses.primary.values[1] + kick);
         let lowest = LOWEST_HOP * system.half_width;
         if !is_rounding && !system.forces.carry(contact.wall(), kick, acceleration, lowest) {
@@ -386,7 +386,7 @@ fn refuse_duration(duration: f64) -> Result<(), InvalidValue> {
 /// A hop lower than this fraction of the half-width cannot be told from contact in double precision.
 const LOWEST_HOP: f64 = 1.0 / (1u64 << 56) as f64;
 /// Relative rounding error of an acceleration that is the sum of a few terms.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
+const ACCELERATION_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Accelerations this small against `omega0² b` are zero: subnormal values carry no significant digits.
 const SMALLEST_ACCELERATION: f64 = 1e-200;
 
@@ -504,6 +504,6 @@ impl<P: Primary> Plant<P> {
     /// Rounding error of the acceleration, m/s².
     pub(crate) fn acceleration_error(&self, velocity: f64) -> f64 {
         let smallest = SMALLEST_ACCELERATION * self.moving.system.half_width * self.moving.system.free.omega0_squared;
-        ROUNDING * (self.acceleration_bound(velocity) + self.moving.system.forces.size()) + smallest
+        ACCELERATION_ROUNDING * (self.acceleration_bound(velocity) + self.moving.system.forces.size()) + smallest
     }
 }

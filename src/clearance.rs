@@ -58,7 +58,7 @@ pub struct Closure<D> {
 
 /// A contact nearer than this fraction of the fastest rate's time is solved on the local Taylor polynomial, whose first
 /// term left out is then below 1e-16/24 of the motion's amplitude.
-const NEAR: f64 = 1e-4;
+const NEAR_CONTACT: f64 = 1e-4;
 /// Steps below [`TINY`] times the fastest rate's time that are tolerated in a row.
 const MOST_TINY_STEPS: usize = 20;
 const TINY: f64 = 1e-9;
@@ -95,8 +95,8 @@ pub fn first_closure<const N: usize, D: Look>(
             } else {
                 bounds.open(which, gap, &derivatives, left)
             };
-            if open * fastest < NEAR && open < left {
-                let contact = gap.contact_nearby(2.0 * NEAR / fastest);
+            if open * fastest < NEAR_CONTACT && open < left {
+                let contact = gap.contact_nearby(2.0 * NEAR_CONTACT / fastest);
                 if let Some(h) = contact.filter(|h| *h <= left)
                     && nearest.is_none_or(|(nearer, _)| h < nearer)
                 {

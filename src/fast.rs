@@ -26,7 +26,7 @@ use crate::contact::Wall;
 use crate::oscillator::Oscillator;
 use crate::segment::{Motion, Segment};
 use crate::system::{Moving, System};
-use propagator::{Coefficients, Grid, Increment, PhasePoint, Propagator, SAME, ShortStep};
+use propagator::{Coefficients, Grid, Increment, PhasePoint, Propagator, SAME_STEP, ShortStep};
 use verify::{Horizon, Start};
 
 /// How often a phasor is rotated before it is computed from the phase again.
@@ -242,7 +242,7 @@ impl FastPath {
             }
         } else {
             self.coefficients.prepare(oscillator, drive.omega);
-            if t * fastest > propagator::LONGEST {
+            if t * fastest > propagator::LONGEST_SERIES {
                 self.state.sequence.learn(&self.coefficients, t);
             }
             self.after(&Start::new(moving, *start), t)
@@ -258,7 +258,7 @@ impl FastPath {
         if self.cache.step.serves(drive, duration - self.cache.step.t) {
             return true;
         }
-        let again = (duration - self.state.last_duration).abs() <= SAME * duration;
+        let again = (duration - self.state.last_duration).abs() <= SAME_STEP * duration;
         self.state.last_duration = duration;
         if again && !without("short step") && ShortStep::is_short(oscillator, drive.omega, duration) {
             self.cache.step = ShortStep::from(duration);

@@ -5,7 +5,7 @@ use crate::contact::Wall;
 use crate::segment::{Instant, Motion, Series, position_change, velocity_change};
 
 /// A gap smaller than this fraction of the half-width cannot be told from none.
-const RESOLUTION: f64 = 1.0 / (1u64 << 60) as f64;
+const GAP_RESOLUTION: f64 = 1.0 / (1u64 << 60) as f64;
 
 /// One flight, or one stretch of sliding: the primary mass's motion, and where the particle is relative to it at the start.
 #[derive(Clone, Debug)]
@@ -85,7 +85,7 @@ impl<M: Motion> Flight<M> {
             ([self.gap(wall, (self.start.1 * t + dw.0, dw.1), &d), reversal], d)
         };
         let speed = self.motion.derivatives_at_start()[1].abs() + self.start.1.abs();
-        let resolutions = [RESOLUTION * self.half_width, 4.0 * f64::EPSILON * unit * speed];
+        let resolutions = [GAP_RESOLUTION * self.half_width, 4.0 * f64::EPSILON * unit * speed];
         let scale = (self.motion.fastest(), resolutions);
         let (closure, looks) = first_closure((from, limit), scale, look, Sliding { motion: &self.motion, unit });
         match closure {
@@ -129,7 +129,7 @@ impl<M: Motion> Flight<M> {
                 d,
             )
         };
-        let scale = (self.motion.fastest(), [RESOLUTION * self.half_width; 2]);
+        let scale = (self.motion.fastest(), [GAP_RESOLUTION * self.half_width; 2]);
         let (closure, looks) = first_closure((from, limit), scale, look, self);
         match closure {
             Ok(closure) => self.end((closure.t, closure.h), Some(Wall::BOTH[closure.which]), looks),

@@ -434,7 +434,7 @@ fn vector(values: impl ExactSizeIterator<Item = f64>) -> DVector<f64> {
 /// Tolerance of symmetry, relative to the largest entries of both rows.
 const SYMMETRIC: f64 = 1e-9;
 /// Rounding of a quadratic form, relative to the sum of its terms' magnitudes.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
+const FORM_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Host {
     /// A host with these matrices. Coordinates of its points are the degrees of freedom.
@@ -470,7 +470,12 @@ impl Host {
         positive("M (mass matrix)", "kg", &mass, f64::MIN_POSITIVE)?;
         positive("K (stiffness matrix)", "N/m", &stiffness, f64::MIN_POSITIVE)?;
         let size = damping.abs().row_sum().max();
-        positive("C (damping matrix)", "N s/m", &damping, -ROUNDING * n as f64 * size)?;
+        positive(
+            "C (damping matrix)",
+            "N s/m",
+            &damping,
+            -FORM_ROUNDING * n as f64 * size,
+        )?;
 
         let shapes = shapes_without_damping(&mass, &stiffness)?;
         let to_modal = shapes.tr_mul(&mass);
@@ -488,7 +493,7 @@ impl Host {
         let proportional = states.is_empty()
             && (0..n)
                 .flat_map(|i| (0..i).map(move |j| (i, j)))
-                .all(|(i, j)| modal_damping[(i, j)].abs() <= ROUNDING * size(i, j));
+                .all(|(i, j)| modal_damping[(i, j)].abs() <= FORM_ROUNDING * size(i, j));
         let cavity = project(&row);
         let force = excitation == Excitation::Force;
         let participation = if force {
@@ -769,7 +774,7 @@ fn shapes_without_damping(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Resu
         let correction = DMatrix::from_fn(n, n, |i, j| {
             let apart = values[j] - values[i];
             // Modes nearer than rounding share a plane in which every pair serves.
-            if i == j || apart.abs() <= ROUNDING * n as f64 * values[i].abs().max(values[j].abs()) {
+            if i == j || apart.abs() <= FORM_ROUNDING * n as f64 * values[i].abs().max(values[j].abs()) {
                 0.5 * r[(i, j)]
             } else {
                 (s[(i, j)] + values[j] * r[(i, j)]) / apart

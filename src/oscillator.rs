@@ -7,7 +7,7 @@ use crate::arithmetic::{divided, plus, product, quotient, sincos_of_product, spl
 use num_complex::Complex64;
 
 /// Below this part of the decay rate the two rates are too near each other to be told apart by subtraction.
-pub(crate) const APART: f64 = 0.1;
+pub(crate) const SEPARATE_RATES: f64 = 0.1;
 
 /// Coefficients of one oscillator, derived once from mass, stiffness and damping.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,7 +157,7 @@ impl Oscillator {
         } else {
             e_slow * (-libm::expm1(-gap * t) / gap)
         };
-        let (xx, vv) = if half_gap > APART * self.delta {
+        let (xx, vv) = if half_gap > SEPARATE_RATES * self.delta {
             // Far from critical the mean of the exponentials and delta s nearly cancel; this form has no such loss.
             (
                 (slow * e_fast - fast * e_slow) / gap,
@@ -179,7 +179,7 @@ impl Oscillator {
 
 /// Whether the rates of `oscillator` are far apart.
 pub(crate) fn is_apart(oscillator: &Oscillator) -> bool {
-    matches!(oscillator.regime, Regime::Overdamped { half_gap, .. } if half_gap > APART * oscillator.delta)
+    matches!(oscillator.regime, Regime::Overdamped { half_gap, .. } if half_gap > SEPARATE_RATES * oscillator.delta)
 }
 
 /// Positions after `t` seconds under a push of 1 and under one that grows as the time, s² and s³, where the rates are apart.

@@ -353,7 +353,7 @@ fn unit(n: usize, place: usize, value: f64) -> Vec<f64> {
 // Clipping
 
 /// Shortest time above the limit, over the length of a step: within it a crest exceeds the limit by less than rounding.
-const SHORTEST: f64 = 1e-9;
+const SHORTEST_EXCESS: f64 = 1e-9;
 
 impl Plant<Structure> {
     /// Advances by `duration` seconds under `drive`, which is [clipped](Self::clipped) at plus and minus `limit`. Returns whether it was clipped.
@@ -440,7 +440,7 @@ impl<'a> Command<'a> {
     fn crossings(&self, limit: f64, duration: f64) -> Vec<f64> {
         let mut found = Vec::new();
         for sign in [-1.0, 1.0] {
-            self.search(sign * limit, [0.0, duration], SHORTEST * duration, &mut found);
+            self.search(sign * limit, [0.0, duration], SHORTEST_EXCESS * duration, &mut found);
         }
         found.sort_by(f64::total_cmp);
         found

@@ -16,7 +16,7 @@ mod common;
 use std::path::Path;
 
 use common::*;
-use vines_bench::identification::WINDOW;
+use vines_bench::identification::DECAY_WINDOW;
 use vines_bench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
 
 /// Windows of the fit, periods.
@@ -104,13 +104,13 @@ fn shaker(file: &str, state: &str) -> Result<String, Failure> {
         fast: f64::INFINITY,
     };
     let mut clean = record(&mut rig, &scene.plan())?;
-    let mut points = decay_points(&clean, &scene.knowledge(), WINDOW).points;
+    let mut points = decay_points(&clean, &scene.knowledge(), DECAY_WINDOW).points;
     points.retain(|point| point.c > COMPARED_ABOVE);
     let mut fit_of = |values: &[f64]| -> Vec<[f64; 2]> {
         for (sample, value) in clean.samples.iter_mut().zip(values) {
             sample.sensors.response = *value;
         }
-        let points = decay_points(&clean, &scene.knowledge(), WINDOW).points;
+        let points = decay_points(&clean, &scene.knowledge(), DECAY_WINDOW).points;
         points.iter().map(|point| [point.tau, point.sigma]).collect()
     };
     let steady = fit_of(&rig.without_ringing(scene.sample_time()));

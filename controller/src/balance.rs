@@ -21,19 +21,17 @@ use crate::real::{Real, larger};
 // 2 epsilon b B, which is 2 B/G of the drive E = G epsilon b. Steady motions have B up to 1.07, the loss of symmetry, and need a G from about 0.7.
 // A structure with a heavier or faster body, or with a second mode near the first, needs `residual_max` = none.
 
-/// Largest growth without work, multiples of the largest drive, beyond `SHARE`: 2 B/G, with the largest B and the least G. In 2400 random rigs, half of which started with a
-/// particle that moves, the growth was at most 0.6 of it.
+/// Largest growth without work, multiples of the largest drive, beyond `LARGEST_ERROR`: 2 B/G, with the largest B and the least G.
 const GROWTH: Real = 3.0;
-/// Largest loss beyond damping and impacts, and largest distance below the linear response beyond `SHARE`, multiples of the largest drive. On
+/// Largest loss beyond damping and impacts, and largest distance below the linear response beyond `LARGEST_ERROR`, multiples of the largest drive. On
 /// average impacts take at most what the drive gives, but at once: pi/2 E for half a period. Until the next one a detector of a tenth of the
-/// frequency shows the share 1 - exp(-0.1 pi) = 0.27 of it. In 1200 random rigs that started at rest the loss was at most a quarter of this limit.
+/// frequency shows the share 1 - exp(-0.1 pi) = 0.27 of it: 0.4 E.
 const LOSS: Real = 0.4;
 /// Largest loss, as a share of the response before it. A decay loses the share `x` of the response that it starts from beyond what is expected if
 /// the damping rate is larger than the configured one by the share `x`: this assumes that the damping rate, with what noise adds, is known to 12 %.
-/// In the same rigs the loss was at most a quarter of this.
 const LOSS_SHARE: Real = 0.12;
 /// Largest error of growth and linear response, as a share of it: a factor of two. Sensors are calibrated better, and impacts take less.
-const SHARE: Real = 0.5;
+const LARGEST_ERROR: Real = 0.5;
 /// Damping ratio of a structure whose damping is not known: the largest at which the equation above holds to a tenth, because its error is of the
 /// order of the damping ratio. More damping allows more loss and a lower response, so that no sound rig is refused.
 const DAMPING: Real = 0.1;
@@ -123,8 +121,8 @@ impl Balance {
         if answered > 0.0 {
             self.linear += given - damping * self.linear;
         }
-        self.growth - self.initial > GROWTH * drive + SHARE * response
+        self.growth - self.initial > GROWTH * drive + LARGEST_ERROR * response
             || self.loss > LOSS * drive + LOSS_SHARE * (response + self.loss)
-            || answered < GROWING * TAU && self.linear - response > LOSS * drive + SHARE * self.linear
+            || answered < GROWING * TAU && self.linear - response > LOSS * drive + LARGEST_ERROR * self.linear
     }
 }

@@ -196,7 +196,7 @@ fn panic_message(panic: &(dyn Any + Send)) -> &str {
 }
 
 /// No call needs more elements; a larger count is a negative or uninitialised number.
-const MOST: usize = 1 << 20;
+const MOST_ELEMENTS: usize = 1 << 20;
 
 /// The elements of an array that is read.
 #[inline]
@@ -276,7 +276,7 @@ unsafe fn text<'a>(pointer: *const c_char) -> Option<Cow<'a, str>> {
 
 #[inline]
 fn check<T>(pointer: *const T, count: usize, what: &str) -> Result<(), Refusal> {
-    if pointer.is_null() || !pointer.is_aligned() || count > MOST {
+    if pointer.is_null() || !pointer.is_aligned() || count > MOST_ELEMENTS {
         return Err(refuse_array(pointer.is_null(), count, what));
     }
     Ok(())
@@ -286,7 +286,7 @@ fn check<T>(pointer: *const T, count: usize, what: &str) -> Result<(), Refusal> 
 #[inline]
 fn check_both<T>(references: *const CValueReference, values: *const T, count: usize) -> Result<(), Refusal> {
     let aligned = references.is_aligned() & values.is_aligned();
-    if !aligned | references.is_null() | values.is_null() | (count > MOST) {
+    if !aligned | references.is_null() | values.is_null() | (count > MOST_ELEMENTS) {
         return refuse_either(references, values, count);
     }
     Ok(())
@@ -303,8 +303,8 @@ fn refuse_either<T>(references: *const CValueReference, values: *const T, count:
 fn refuse_array(null: bool, count: usize, what: &str) -> Refusal {
     Refusal::error(if null {
         format!("{what} is NULL; expected an array of {count}")
-    } else if count > MOST {
-        format!("the count of {what} is {count}; allowed are at most {MOST}")
+    } else if count > MOST_ELEMENTS {
+        format!("the count of {what} is {count}; allowed are at most {MOST_ELEMENTS}")
     } else {
         format!("{what} is not aligned; expected an array of {count}")
     })

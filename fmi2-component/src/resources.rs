@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::refusal::Refusal;
 
 /// No resource is larger: a component reads descriptions, not recordings.
-const LARGEST: u64 = 1 << 26;
+const LARGEST_RESOURCE: u64 = 1 << 26;
 
 /// The files in the folder `resources/` of an unpacked FMU.
 #[derive(Debug)]
@@ -49,9 +49,9 @@ impl Resources {
                 "fmuResourceLocation is \"{given}\", and there is no {name}; expected the location of the folder that has it"
             )));
         };
-        if size > LARGEST {
+        if size > LARGEST_RESOURCE {
             return Err(Refusal::error(format!(
-                "{} has {size} bytes; allowed are at most {LARGEST}",
+                "{} has {size} bytes; allowed are at most {LARGEST_RESOURCE}",
                 path.display()
             )));
         }

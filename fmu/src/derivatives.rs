@@ -9,7 +9,7 @@ use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Plant};
 
 /// The highest order of output derivatives, as the description says it.
-const MOST: u32 = 3;
+const OUTPUT_ORDER: u32 = 3;
 
 /// A value that follows from the rig at one instant; 0 for one that only changes at events.
 pub(super) fn of_instant<T: Scalar>(now: &Instant<T>, variable: Real) -> T {
@@ -128,9 +128,9 @@ impl LoViNes {
                 "output derivatives exist for one oscillator in co-simulation only",
             ));
         };
-        if order > MOST {
+        if order > OUTPUT_ORDER {
             return Err(Refusal::error(format!(
-                "derivative {order} of {} is refused; allowed are orders 1 to {MOST}",
+                "derivative {order} of {} is refused; allowed are orders 1 to {OUTPUT_ORDER}",
                 variable.variable().name
             )));
         }

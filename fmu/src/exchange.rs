@@ -9,7 +9,7 @@ use lovines::{Drive, Parameters, State};
 
 /// How far behind a wall an impact may be met without a warning, in half-widths. Masters that look for the zeros of event indicators
 /// stop within 1e-6.
-const FARTHEST: f64 = 1e-3;
+const LATE_IMPACT: f64 = 1e-3;
 
 impl LoViNes {
     /// A value that was set, or that follows from the equations' state.
@@ -79,7 +79,7 @@ impl ModelExchange for LoViNes {
     fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal> {
         self.check_settings()?;
         let behind = self.hybrid().behind_wall();
-        if behind > 1.0 + FARTHEST {
+        if behind > 1.0 + LATE_IMPACT {
             log.warn_once(
                 "walls",
                 format_args!(

@@ -103,7 +103,7 @@ macro_rules! with_plant {
 use with_plant;
 
 /// The highest order of input derivatives that is followed.
-const DERIVATIVES: u32 = 3;
+const INPUT_ORDER: u32 = 3;
 
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
 enum Progress {
@@ -243,9 +243,9 @@ impl Component for LoViNes {
 
     fn set_real_input_derivative(&mut self, variable: Real, order: u32, value: f64, log: &Log) -> Result<(), Refusal> {
         let name = variable.variable().name;
-        if order > DERIVATIVES {
+        if order > INPUT_ORDER {
             return Err(Refusal::error(format!(
-                "derivative {order} of {name} is refused; allowed are orders 1 to {DERIVATIVES}"
+                "derivative {order} of {name} is refused; allowed are orders 1 to {INPUT_ORDER}"
             )));
         }
         if !matches!(variable, Real::e) {

@@ -7,9 +7,9 @@ use lovines::{BaseMotion, State};
 use std::cell::Cell;
 
 /// Number of outputs that are kept.
-const KEPT: usize = 11;
+const OUTPUTS_KEPT: usize = 11;
 
-/// Where an output is kept, in the order of the variable table, so that this is a subtraction; `KEPT` for what is not.
+/// Where an output is kept, in the order of the variable table, so that this is a subtraction; `OUTPUTS_KEPT` for what is not.
 #[inline]
 const fn place(variable: Real) -> usize {
     match variable {
@@ -24,7 +24,7 @@ const fn place(variable: Real) -> usize {
         Real::phase => 8,
         Real::impact_time => 9,
         Real::impact_velocity => 10,
-        _ => KEPT,
+        _ => OUTPUTS_KEPT,
     }
 }
 
@@ -32,11 +32,11 @@ const BASE: usize = 7;
 
 /// Outputs as they were at the end of the last step; NaN for one that must be computed.
 #[derive(Clone, Debug)]
-pub(super) struct Outputs([Cell<f64>; KEPT]);
+pub(super) struct Outputs([Cell<f64>; OUTPUTS_KEPT]);
 
 impl Default for Outputs {
     fn default() -> Self {
-        Self([const { Cell::new(f64::NAN) }; KEPT])
+        Self([const { Cell::new(f64::NAN) }; OUTPUTS_KEPT])
     }
 }
 

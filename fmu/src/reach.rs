@@ -7,7 +7,7 @@ use lovines::plant::{MOST_EVALUATIONS, MOST_IMPACTS, MOST_RELEASES};
 use lovines::{Drive, InvalidValue, Outcome, Parameters, State};
 
 /// Limit in half-widths: there the spacing of doubles is one half-width.
-const RESOLUTION: f64 = 1.0 / f64::EPSILON;
+const DOUBLES_LIMIT: f64 = 1.0 / f64::EPSILON;
 
 /// The largest displacements and velocities allowed for a cavity.
 #[derive(Clone, Copy, Default)]
@@ -29,7 +29,7 @@ pub(super) struct Reach {
 
 impl Reach {
     pub fn of(parameters: &Parameters, fastest: f64, per_drive: f64) -> Self {
-        let displacement = parameters.half_width * RESOLUTION;
+        let displacement = parameters.half_width * DOUBLES_LIMIT;
         let [plus, minus] = parameters.gaps();
         Self {
             // The position on a wall has a rounding error if the gaps differ.

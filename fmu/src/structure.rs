@@ -18,8 +18,8 @@ use super::{LoViNes, Simulation, log};
 /// The file in `resources/`.
 const FILE: &str = "structure.json";
 
-/// Value reference of the first output at a point. Those of point n are `FIRST + 3 n` for its displacement, velocity and acceleration.
-const FIRST: u32 = 1000;
+/// Value reference of the first output at a point. Those of point n are `FIRST_POINT_REFERENCE + 3 n` for its displacement, velocity and acceleration.
+const FIRST_POINT_REFERENCE: u32 = 1000;
 
 /// Parameters of the oscillator whose place the structure takes.
 pub(super) const REPLACED: [&str; 3] = ["M", "k", "c"];
@@ -136,7 +136,7 @@ impl Adopted {
 
     /// The value references of the outputs at its points.
     pub fn outputs(&self) -> Range<u32> {
-        FIRST..FIRST + 3 * self.points.len() as u32
+        FIRST_POINT_REFERENCE..FIRST_POINT_REFERENCE + 3 * self.points.len() as u32
     }
 
     /// The largest displacement of the cavity that a constant drive can cause, m per unit.
@@ -221,7 +221,10 @@ impl LoViNes {
 
     /// A displacement, velocity or acceleration at a point, at the end of the last step.
     pub(super) fn at_point(&self, reference: u32) -> f64 {
-        let (n, quantity) = ((reference - FIRST) / 3, (reference - FIRST) % 3);
+        let (n, quantity) = (
+            (reference - FIRST_POINT_REFERENCE) / 3,
+            (reference - FIRST_POINT_REFERENCE) % 3,
+        );
         match (&self.adopted, &self.simulation) {
             (Some(adopted), Simulation::Structure(plant)) => adopted.points[n as usize].of(plant)[quantity as usize],
             _ => 0.0,

@@ -241,7 +241,7 @@ fn documentation(component: &Component, description: &Description) -> String {
 }
 
 /// Outputs of the plant whose start is a parameter, too, under another name.
-const STARTS: [(&str, &str); 4] = [
+const START_PARAMETERS: [(&str, &str); 4] = [
     ("q1", "q1_start"),
     ("der(q1)", "der_q1_start"),
     ("q2", "q2_start"),
@@ -249,24 +249,24 @@ const STARTS: [(&str, &str); 4] = [
 ];
 
 /// The structure of the coupled system; step size and end of the default experiment are filled in.
-const STRUCTURE: &str = include_str!("pack/SystemStructure.ssd");
+const SYSTEM_STRUCTURE: &str = include_str!("pack/SystemStructure.ssd");
 
 /// The end of the default experiment, natural periods: the default scene has been locked for nearly a hundred by then.
-const PERIODS: f64 = 400.0;
+const OSCILLATOR_PERIODS: f64 = 400.0;
 
 /// The system file of the FMUs, with the parameters of the scene.
 fn system(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     // The communication step is the controller's.
     let step = scene.sample_time();
-    let stop = PERIODS * scene.dimensionless().natural_period();
-    let mut structure = STRUCTURE.to_owned();
+    let stop = OSCILLATOR_PERIODS * scene.dimensionless().natural_period();
+    let mut structure = SYSTEM_STRUCTURE.to_owned();
     for (attribute, value) in [("stopTime", stop), ("stepSize", step), ("baseStepSize", step)] {
         let [derived, own] = ["derived".into(), value.to_string()].map(|value| format!(" {attribute}=\"{value}\""));
         structure = structure.replace(&derived, &own);
     }
     // The start of the plant goes by its parameters: some masters set no start value of an output.
     let plant = scene.start_values().into_iter().map(|(name, value)| {
-        let parameter = STARTS.iter().find(|(output, _)| *output == name);
+        let parameter = START_PARAMETERS.iter().find(|(output, _)| *output == name);
         (parameter.map_or(name, |(_, parameter)| parameter), value)
     });
     // The controller is armed from the start.

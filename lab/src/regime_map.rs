@@ -14,10 +14,10 @@ use crate::scene::Family;
 use crate::theory::SlowFlow;
 
 /// Most values of an axis: all cells are in memory, 200 bytes each, and in one figure.
-const MOST: u64 = 2000;
+const MOST_AXIS_VALUES: u64 = 2000;
 
 /// Short names of two keys: the numbers of the theory, both dimensionless.
-const SHORT: [(&str, &str); 2] = [("G", "excitation.G"), ("r", "plant.r")];
+const SHORT_NAMES: [(&str, &str); 2] = [("G", "excitation.G"), ("r", "plant.r")];
 
 /// A number of the scene, or sigma, with values at equal distances. Parse it from `plant.r=0.3:1:71`: first, last, and how many.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +48,7 @@ impl Axis {
     /// The name: short where there is a short one.
     #[must_use]
     pub fn name(&self) -> &str {
-        let short = SHORT.iter().find(|(_, key)| *key == self.key);
+        let short = SHORT_NAMES.iter().find(|(_, key)| *key == self.key);
         short.map_or(&self.key, |(short, _)| short)
     }
 }
@@ -74,13 +74,17 @@ impl FromStr for Axis {
             _ => Err(format!("`{text}` is not a finite number; {form}")),
         };
         let (name, from, to) = (name.trim(), number(from)?, number(to)?);
-        let count = points.parse().ok().filter(|points| (2..=MOST).contains(points));
-        let points =
-            count.ok_or_else(|| format!("`{points}` points: a whole number from 2 to {MOST} is allowed; {form}"))?;
+        let count = points
+            .parse()
+            .ok()
+            .filter(|points| (2..=MOST_AXIS_VALUES).contains(points));
+        let points = count.ok_or_else(|| {
+            format!("`{points}` points: a whole number from 2 to {MOST_AXIS_VALUES} is allowed; {form}")
+        })?;
         if from >= to {
             return Err(format!("{name} from {from} to {to}: the first must be below the last").into());
         }
-        let key = SHORT
+        let key = SHORT_NAMES
             .iter()
             .find(|(short, _)| *short == name)
             .map_or(name, |(_, key)| key);

@@ -153,9 +153,9 @@ pub struct Plant {
     plant: Box<OnePlant>,
 }
 
-/// Oscillations (in radians) and crossings of the cavity that take about a millisecond. A longer advance is computed in a thread, so that
+/// Oscillations (in radians, of the fastest mode or the drive) and crossings of the cavity that take about a millisecond. A longer advance is computed in a thread, so that
 /// Ctrl-C ends it.
-const SHORT: f64 = 1e3;
+pub(crate) const SHORT_ADVANCE: f64 = 1e3;
 
 impl Plant {
     fn of(plant: OnePlant) -> Self {
@@ -173,7 +173,7 @@ impl Plant {
         let speed = state.dq1.abs() + state.dq2.abs() + (drive.amplitude * drive.omega).abs();
         let crossings = speed / self.plant.parameters().half_width;
         let (before, stop) = (self.plant.save(), AtomicBool::new(false));
-        let result = if duration * (fastest(&self.plant, drive) + crossings) < SHORT {
+        let result = if duration * (fastest(&self.plant, drive) + crossings) < SHORT_ADVANCE {
             Ok(work(&mut self.plant, &stop))
         } else {
             wait(py, &stop, |_| Ok(()), || work(&mut self.plant, &stop))
@@ -379,7 +379,7 @@ pub struct Plants {
 }
 
 /// Parts of a batch per thread: plants differ in their cost.
-const PARTS: usize = 64;
+const PARTS_PER_THREAD: usize = 64;
 
 /// Memory for `n` plants, or a `MemoryError`: without this, a batch that does not fit would end the interpreter.
 fn reserve(plants: &mut Vec<Saved>, n: usize) -> PyResult<()> {
@@ -478,7 +478,10 @@ impl Plants {
             |_| Ok(()),
             || {
                 next.extend_from_slice(plants);
-                let part = plants.len().div_ceil(PARTS * rayon::current_num_threads()).max(1);
+                let part = plants
+                    .len()
+                    .div_ceil(PARTS_PER_THREAD * rayon::current_num_threads())
+                    .max(1);
                 let parts = next.par_chunks_mut(part).enumerate();
                 parts
                     .map_init(

@@ -18,6 +18,7 @@ use vines_bench::{
 
 use crate::{
     number::{RadPerSecond, Real, Second},
+    plants::SHORT_ADVANCE,
     scene::{Scene, invalid},
     wait::wait_apart,
 };
@@ -31,10 +32,8 @@ pub struct StructurePlant {
     check_interval: f64,
 }
 
-/// Oscillations of the fastest mode or the drive (radians) that take about a millisecond.
-const SHORT: f64 = 1e3;
 /// Columns before those of the channels: time, drive, q2, impacts.
-const COLUMNS: usize = 4;
+const COLUMNS_BEFORE_CHANNELS: usize = 4;
 
 /// A row; the channels are those of the present structure, whose stinger may have been cut.
 fn row(rig: &SimulatedStructure) -> Vec<f64> {
@@ -110,7 +109,7 @@ impl StructurePlant {
         let omegas = self.structure.modes.iter().map(|mode| mode.omega);
         let fastest = omegas.fold(omega.0.abs(), f64::max);
         // A thread costs more than a short motion.
-        let result = if duration.0 * fastest < SHORT {
+        let result = if duration.0 * fastest < SHORT_ADVANCE {
             run()
         } else {
             wait_apart(py, &stop, run)?
@@ -121,7 +120,7 @@ impl StructurePlant {
             Some(error) => invalid(error),
         })?;
         self.plant = plant;
-        let shape = (steps + 1, COLUMNS + channels);
+        let shape = (steps + 1, COLUMNS_BEFORE_CHANNELS + channels);
         Ok(Array2::from_shape_vec(shape, rows).map_err(invalid)?.into_pyarray(py))
     }
 }

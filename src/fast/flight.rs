@@ -1,6 +1,9 @@
 //! The next contact of a free flight: predicted, then verified.
 
-use super::propagator::{Coefficients, Increment, NEAR, Nearby, POINTS, PhasePoint, Propagator, STRETCH, TERMS, angle};
+use super::propagator::{
+    Coefficients, GRID_POINTS, Increment, Nearby, PROPAGATOR_REACH, PhasePoint, Propagator, STRETCH_POINTS,
+    TAYLOR_TERMS, angle,
+};
 use super::verify::{Horizon, Mark, RelativeMotion, Start};
 use super::{FastPath, Next, without};
 use crate::arithmetic::Sum;
@@ -189,7 +192,7 @@ fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
 // the first contact; the other wall is out of reach if the height `u²/(2a)` is below the half-width.
 
 /// Longest hop, in units of the fastest rate's time: it ends within reach of the start's Taylor polynomial.
-const LONGEST: f64 = 1.0 / 20.0;
+const LONGEST_HOP: f64 = 1.0 / 20.0;
 
 impl FastPath {
     /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds.
@@ -205,7 +208,7 @@ impl FastPath {
         let fastest = (start.system.free.fastest).max(start.base.drive.omega.abs());
         let short = speed > 0.0
             && pressing > 0.0
-            && about * fastest <= LONGEST
+            && about * fastest <= LONGEST_HOP
             && 1.25 * about < left
             && speed * speed < pressing * b;
         if short { self.short_hop(start, about) } else { None }
@@ -227,7 +230,7 @@ impl FastPath {
 /// Longest flight that is marched over, in stretches.
 const MOST_STRETCHES: u32 = 64;
 /// Shortest stretch, in distances between points of the grid.
-const SHORTEST: usize = 3;
+const SHORTEST_STRETCH: usize = 3;
 /// So many divisions in a march, and the plain solver is cheaper.
 const MOST_DIVIDED: u32 = 16;
 /// Longest stretch before a predicted contact that one bound can verify, in stretches.
@@ -247,7 +250,7 @@ enum Stretch {
 
 impl FastPath {
     /// Marches over the flight until a contact is found or `left` seconds are over. Where a stretch cannot be verified, it is
-    /// halved, down to [`SHORTEST`].
+    /// halved, down to [`SHORTEST_STRETCH`].
     #[inline(never)]
     pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Arrival>) -> FlightEnd {
         if without("march") {
@@ -255,7 +258,7 @@ impl FastPath {
         }
         let mut from = start.here;
         // Points of the grid in the next stretch.
-        let mut n = STRETCH;
+        let mut n = STRETCH_POINTS;
         let mut divided = 0;
         for _ in 0..MOST_STRETCHES {
             if let Some(arrival) = predicted
@@ -277,7 +280,7 @@ impl FastPath {
                     if from.t >= left {
                         break;
                     }
-                    n = STRETCH.min(2 * n);
+                    n = STRETCH_POINTS.min(2 * n);
                     continue;
                 }
                 Stretch::Contact(t, wall) => (self.arrive_after(start, &from, t, wall))
@@ -286,7 +289,7 @@ impl FastPath {
             };
             match found {
                 Some(arrival) => return FlightEnd::Contact(arrival),
-                None if n > SHORTEST && divided < MOST_DIVIDED => {
+                None if n > SHORTEST_STRETCH && divided < MOST_DIVIDED => {
                     n /= 2;
                     divided += 1;
                 }
@@ -316,13 +319,13 @@ impl FastPath {
 
     /// The time of a point of the grid after a mark, and the motion near it: the point is the nearest one to the time `t`.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(super) fn near_point(&mut self, start: &Start, from: &Mark, t: f64) -> (f64, Nearby<TERMS>) {
+    pub(super) fn near_point(&mut self, start: &Start, from: &Mark, t: f64) -> (f64, Nearby<TAYLOR_TERMS>) {
         self.evaluations += 1;
         let (coefficients, amplitude) = (&self.coefficients, start.base.drive.amplitude);
         // Near the mark the mark itself: it needs no propagator.
         let n = match (t - from.t) / coefficients.spacing {
             part if part < NEAR_MARK => 0,
-            part => ((part + 0.5) as usize).min(POINTS),
+            part => ((part + 0.5) as usize).min(GRID_POINTS),
         };
         let increment = match n {
             0 => Increment { y: 0.0, dy: 0.0, phasor: from.point.phasor },
@@ -341,7 +344,7 @@ impl FastPath {
         let here = start.here.point;
         let mut mark = start.here;
         while t - mark.t > self.coefficients.span {
-            mark = self.mark(start, &mark, POINTS);
+            mark = self.mark(start, &mark, GRID_POINTS);
         }
         let (at, nearby) = self.near_point(start, &mark, t);
         let Increment { y, dy, phasor } = nearby.at(t - at);
@@ -412,7 +415,7 @@ const MOST_ITERATIONS: u32 = 6;
 /// Largest remaining error, relative to the time since the mark.
 const LARGEST_ERROR: f64 = 1e-16;
 /// Longest last step, in reaches of a Taylor polynomial: what it adds is known to second order.
-const SHORT: f64 = 1e-6;
+const LONGEST_LAST_STEP: f64 = 1e-6;
 
 /// A contact.
 #[derive(Clone, Copy)]
@@ -466,7 +469,7 @@ pub(super) fn arrive<const FORCED: bool>(
     // Where the approach is slow and curved, the reversed series is not accurate.
     let [c2, c3, c4, _] = nearby.c;
     let c2 = c2 - half;
-    if (c2 * slowness * first).abs() >= NEAR {
+    if (c2 * slowness * first).abs() >= PROPAGATOR_REACH {
         return None;
     }
     let h = reversed(&[c2, c3, c4], first, slowness);
@@ -538,7 +541,7 @@ impl FastPath {
             }
             // Newton's method squares the error.
             let error = ((nearby.c[0] - half) * slowness * (step * step)).abs();
-            if error <= LARGEST_ERROR * (at - from.t + h) && step.abs() <= SHORT * self.coefficients.reach {
+            if error <= LARGEST_ERROR * (at - from.t + h) && step.abs() <= LONGEST_LAST_STEP * self.coefficients.reach {
                 let phasor = nearby.phasor(h + step);
                 let (y, dy) = (there.y + (h * nearby.dy + deviation), nearby.dy + gained);
                 let ddw = start.acceleration(&self.coefficients, &PhasePoint { y: from.point.y + y, dy, phasor });

@@ -197,18 +197,18 @@ impl<const N: usize> Nearby<N> {
 
 /// Farthest distance of an instant from that of a propagator, in units of the fastest rate's time: Taylor polynomials of degree
 /// 5 then leave out less than 1e-17.
-pub(super) const NEAR: f64 = 1.0 / 2048.0;
+pub(super) const PROPAGATOR_REACH: f64 = 1.0 / 2048.0;
 /// Distance of the points of a grid, in units of the fastest rate's time: Taylor polynomials of degree 9 then leave out less than
 /// 1e-18 halfway between two of them.
 const SPACING: f64 = 0.0958;
 /// Farthest distance of an instant from its point, in distances between points.
 const REACH: f64 = 0.7;
 /// Points of the grid: its span is a little more than half a period of the fastest rate.
-pub(super) const POINTS: usize = 36;
+pub(super) const GRID_POINTS: usize = 36;
 /// Points in a stretch of a march.
-pub(super) const STRETCH: usize = 24;
+pub(super) const STRETCH_POINTS: usize = 24;
 /// Number of Taylor coefficients: of degrees 2 to 9.
-pub(super) const TERMS: usize = 8;
+pub(super) const TAYLOR_TERMS: usize = 8;
 
 /// What follows from an oscillator and a frequency.
 #[derive(Clone, Copy, Debug, Default)]
@@ -226,7 +226,7 @@ pub(super) struct Coefficients {
     pub stretch: f64,
     pub span: f64,
     /// `y^(n)/n!` for n from 2 on, per `y`, `y'`, forcing `f` and `f'`, where `y'' + 2 delta y' + omega0² y = f`.
-    pub taylor: [[f64; TERMS]; 4],
+    pub taylor: [[f64; TAYLOR_TERMS]; 4],
 }
 
 impl Coefficients {
@@ -245,8 +245,8 @@ impl Coefficients {
         let (mut last, mut now) = ([0.0, 1.0, 0.0, 0.0], [-omega0_squared, -2.0 * delta, 1.0, 0.0]);
         let mut forcing = [1.0, 0.0];
         let mut factorial = 1.0;
-        let mut taylor = [[0.0; TERMS]; 4];
-        for n in 0..TERMS {
+        let mut taylor = [[0.0; TAYLOR_TERMS]; 4];
+        for n in 0..TAYLOR_TERMS {
             factorial *= (n + 2) as f64;
             for (terms, c) in taylor.iter_mut().zip(now) {
                 terms[n] = c / factorial;
@@ -269,11 +269,11 @@ impl Coefficients {
             key: Some(omega),
             omega,
             forcing: Forcing::new(oscillator, omega),
-            near: NEAR / fastest.max(omega),
+            near: PROPAGATOR_REACH / fastest.max(omega),
             spacing,
             reach: REACH * spacing,
-            stretch: spacing * STRETCH as f64,
-            span: spacing * POINTS as f64,
+            stretch: spacing * STRETCH_POINTS as f64,
+            span: spacing * GRID_POINTS as f64,
             taylor,
         }
     }
@@ -302,9 +302,9 @@ fn leading_bits(x: f64, bits: u32) -> f64 {
 // neither a sine nor a division. That holds for every damping ratio, at resonance and away from it.
 
 /// Longest step, in units of the fastest rate's time: the first term left out is below 1e-17.
-pub(super) const LONGEST: f64 = 1.0 / 8.0;
+pub(super) const LONGEST_SERIES: f64 = 1.0 / 8.0;
 /// Steps whose lengths differ by less, relative, are the same but for a correction of first order; the second order is below 1e-20.
-pub(super) const SAME: f64 = 1e-9;
+pub(super) const SAME_STEP: f64 = 1e-9;
 /// Half the number of the `G_n` beside `G_0`.
 const MOMENTS: usize = 5;
 
@@ -374,19 +374,19 @@ impl ShortStep {
 
     /// Whether a step of `t` seconds can have such a propagator.
     pub fn is_short(oscillator: &Oscillator, omega: f64, t: f64) -> bool {
-        t * oscillator.fastest.max(omega.abs()) <= LONGEST && t > 0.0
+        t * oscillator.fastest.max(omega.abs()) <= LONGEST_SERIES && t > 0.0
     }
 
     /// Whether it serves for a step that is longer by `late` seconds: masters compute equal steps with rounding errors.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn serves(&self, drive: &Drive, late: f64) -> bool {
-        late == 0.0 || (!super::without("late step") && late.abs() <= SAME * self.t && drive.is_straight())
+        late == 0.0 || (!super::without("late step") && late.abs() <= SAME_STEP * self.t && drive.is_straight())
     }
 
     /// Forgets the step if it is not short against the drive.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn drive_changed(&mut self, drive: &Drive) {
-        if drive.omega.abs() * self.t > LONGEST {
+        if drive.omega.abs() * self.t > LONGEST_SERIES {
             *self = Self::default();
         }
     }
@@ -482,13 +482,13 @@ fn moment(oscillator: &Oscillator, n: usize, t: f64) -> f64 {
 // Any instant within the grid is so near a point of it that a Taylor polynomial about that point gives the motion to rounding.
 // No sine and no exponential is left to compute, however irregular the contacts.
 
-/// The propagators over 1 to [`POINTS`] times the spacing, as far as they have been needed: of a regular motion, few are.
+/// The propagators over 1 to [`GRID_POINTS`] times the spacing, as far as they have been needed: of a regular motion, few are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Grid([Propagator; POINTS]);
+pub(super) struct Grid([Propagator; GRID_POINTS]);
 
 impl Default for Grid {
     fn default() -> Self {
-        Self([Propagator::default(); POINTS])
+        Self([Propagator::default(); GRID_POINTS])
     }
 }
 
@@ -513,7 +513,7 @@ impl Grid {
     /// What the free motion adds over `t` seconds: over the nearest point, if there is one, and the rest.
     pub fn increment(&mut self, oscillator: &Oscillator, spacing: f64, t: f64) -> FreeIncrement {
         match (t / spacing + 0.5) as usize {
-            n @ 1..=POINTS if !super::without("grid") => {
+            n @ 1..=GRID_POINTS if !super::without("grid") => {
                 let rest = oscillator.increment(t - n as f64 * spacing);
                 oscillator.composed(&self.free(oscillator, spacing, n), &rest)
             }
@@ -527,17 +527,17 @@ impl Grid {
         self.0[n - 1].respond(oscillator, coefficients);
     }
 
-    /// The propagator over `n` times the spacing, n from 1 to [`POINTS`].
+    /// The propagator over `n` times the spacing, n from 1 to [`GRID_POINTS`].
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn over(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: usize) -> &Propagator {
-        let propagator = &self.0[(n - 1) % POINTS];
+        let propagator = &self.0[(n - 1) % GRID_POINTS];
         if super::without("grid") {
             self.0[n - 1].t = f64::NAN;
             self.fill(oscillator, coefficients, n);
         } else if propagator.t != n as f64 * coefficients.spacing || propagator.omega != coefficients.omega {
             self.fill(oscillator, coefficients, n);
         }
-        &self.0[(n - 1) % POINTS]
+        &self.0[(n - 1) % GRID_POINTS]
     }
 }
 
@@ -551,7 +551,7 @@ mod tests {
     fn a_short_step_agrees_with_the_closed_form_for_every_drive() {
         for zeta in [0.0, 0.006, 0.5, 1.0, 3.0] {
             let oscillator = Oscillator::new(1.0, 1.0, 2.0 * zeta);
-            let t = LONGEST / oscillator.fastest;
+            let t = LONGEST_SERIES / oscillator.fastest;
             let mut step = ShortStep::from(t);
             for omega in [0.0, 0.3, -0.3, 1.0, oscillator.fastest] {
                 let drive = Drive { signal: [0.3, -0.2, 0.1, 0.7], ..Drive::harmonic(0.4, omega) };

@@ -14,7 +14,7 @@ use crate::oscillator::Oscillator;
 use crate::system::{Moving, System};
 
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
-pub(super) const ROUNDING: f64 = 1e-14;
+pub(super) const GAP_ROUNDING: f64 = 1e-14;
 
 /// Relative motion at an instant.
 #[derive(Clone, Copy, Debug, Default)]
@@ -63,7 +63,7 @@ impl RelativeMotion {
         let Self { w, dw, ddw } = *self;
         let remainder = jerk * t * (1.0 / 3.0);
         let half = 0.5 * t;
-        let inside = b - ROUNDING * b;
+        let inside = b - GAP_ROUNDING * b;
         let end = (w + t * (dw + half * ddw)).abs() + half * t * remainder;
         let s = 1f64.copysign(dw);
         let slowing = -s * ddw - remainder;
@@ -201,7 +201,7 @@ impl Horizon {
         // The bound of the gap to either wall is concave: it is above 0 in between if it is at the end.
         let open = |t: f64| {
             let (moved, lost) = (dw * t, t * (jumps + 0.5 * acceleration * t));
-            b - (w + moved).abs() - lost > ROUNDING * (moved.abs() + lost)
+            b - (w + moved).abs() - lost > GAP_ROUNDING * (moved.abs() + lost)
         };
         // Where the bound of the gap ahead ends.
         let (gap, closing) = (b - w * 1f64.copysign(dw), dw.abs() + jumps);

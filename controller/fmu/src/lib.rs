@@ -11,7 +11,7 @@ mod sample_clock;
 mod signal;
 
 use sample_clock::SampleClock;
-use signal::{DERIVATIVES, InputSignal};
+use signal::{INPUT_ORDER, InputSignal};
 
 mod variables {
     include!(concat!(env!("OUT_DIR"), "/variables.rs"));
@@ -273,10 +273,10 @@ impl Component for SampledController {
             _ => return Err(Refusal::error("only inputs have derivatives")),
         };
         let order = order as usize;
-        if order > DERIVATIVES {
+        if order > INPUT_ORDER {
             let name = variable.variable().name;
             return Err(Refusal::error(format!(
-                "derivative {order} of {name} is refused; allowed are orders 1 to {DERIVATIVES}"
+                "derivative {order} of {name} is refused; allowed are orders 1 to {INPUT_ORDER}"
             )));
         }
         signal.set_derivative(order, value);

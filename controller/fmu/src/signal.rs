@@ -7,7 +7,7 @@
 //! line shifts the lock as little, but modulates the amplitude by its error of second order, so that no lock is reported.)
 
 /// The highest order of input derivatives that is followed.
-pub(crate) const DERIVATIVES: usize = 3;
+pub(crate) const INPUT_ORDER: usize = 3;
 
 /// A communication point: its time, s, and the value set there.
 type CommunicationPoint = (f64, f64);
@@ -18,7 +18,7 @@ pub(crate) struct InputSignal {
     /// The value at the communication point.
     pub value: f64,
     /// Coefficients of t, t² and t³; they hold for one step.
-    coefficients: [f64; DERIVATIVES],
+    coefficients: [f64; INPUT_ORDER],
     /// Whether the master has given derivatives for the step to come, be they zero.
     given: bool,
     /// The last communication points before this one, the latest first.
@@ -26,7 +26,7 @@ pub(crate) struct InputSignal {
 }
 
 impl InputSignal {
-    /// Takes the time derivative of that order, from 1 to [`DERIVATIVES`].
+    /// Takes the time derivative of that order, from 1 to [`INPUT_ORDER`].
     pub fn set_derivative(&mut self, order: usize, value: f64) {
         let factorial: usize = (1..=order).product();
         self.coefficients[order - 1] = value / factorial as f64;
@@ -67,7 +67,7 @@ impl InputSignal {
     /// Ends the step from `time`, s.
     pub fn end(&mut self, time: f64) {
         self.before = [Some((time, self.value)), self.before[0]];
-        self.coefficients = [0.0; DERIVATIVES];
+        self.coefficients = [0.0; INPUT_ORDER];
         self.given = false;
     }
 }

@@ -442,9 +442,9 @@ mod tests {
     /// Scenes, and how many fewer than in the stress test of the plant.
     const SCENES: u64 = 150;
     const FEWER: u64 = 25;
-    const SAMPLES: usize = 20;
+    const SCENE_SAMPLES: usize = 20;
     /// Step of the integrator, in units of the fastest rate's time: with steps of 0.01 it jumps over low hops.
-    const STEP: f64 = 0.002;
+    const INTEGRATOR_STEP: f64 = 0.002;
     /// Relative change of the start that shows how a sample spreads differences.
     const CHANGE: f64 = 1e-7;
 
@@ -526,7 +526,7 @@ mod tests {
         /// Displacement and velocity of the primary mass, relative displacement and velocity after the sample, the totals, and rests on a
         /// wall.
         fn run(mut self, duration: f64) -> ([f64; 4], Totals, u64) {
-            let longest = STEP / self.hybrid.parameters.fastest_rate().max(self.drive.omega.abs());
+            let longest = INTEGRATOR_STEP / self.hybrid.parameters.fastest_rate().max(self.drive.omega.abs());
             let mut t = 0.0;
             while t < duration {
                 let h = longest.min(duration - t);
@@ -608,7 +608,7 @@ mod tests {
             let mut plant = Plant::new(parameters, State { q1, q2: q1 - w, ..State::default() }).unwrap();
             let drive = Drive::harmonic(random.decades(-1.0, 0.5), random.between(0.0, 3.0));
             plant.begin(drive).unwrap();
-            for sample in 0..SAMPLES {
+            for sample in 0..SCENE_SAMPLES {
                 let Drive { mut signal, mut amplitude, .. } = plant.base().drive;
                 if slopes {
                     signal[1..].fill_with(|| random.between(-1.0, 1.0));
@@ -670,7 +670,7 @@ mod tests {
         println!(
             "| new drive at every sample, {name}: both interfaces of the FMU differ by, relative | {scenes} scenes, {} samples, {held_samples} \
              of them end at rest | {worst:.1e} | {allowed:.1e} |",
-            scenes * SAMPLES as u64
+            scenes * SCENE_SAMPLES as u64
         );
         let enough = held_samples > scenes / 2 && impacts > scenes || scenes < SCENES;
         assert!(enough, "{held_samples} {impacts} {sticks}");

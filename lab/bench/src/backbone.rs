@@ -12,8 +12,8 @@ use vines_model::numerics::Estimate;
 
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, SLOWEST_LOOP, Search, Stage};
 use crate::identification::{
-    Criterion, Cycle, LONGEST, LevelEstimate, Regime, ResonancePoint, Tone, Unsteady, classify, drive_harmonics,
-    foreign_tone, is_off_target, mean_command, regime_by_response,
+    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonancePoint, Tone, Unsteady, classify,
+    drive_harmonics, foreign_tone, is_off_target, mean_command, regime_by_response,
 };
 use crate::record::Sample;
 use crate::rig::{Controller, Move, OFF, Rig};
@@ -106,11 +106,11 @@ pub struct Tracked {
 type Held = [f64; 3];
 
 /// Additional periods before the first level is measured, because the start of the loop disturbs the particle, too.
-const FIRST: usize = 24;
+const FIRST_PERIODS: usize = 24;
 /// Largest additional drive of a move, as a share of the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 /// Shortest duration of a move, periods.
-const MOVE: f64 = 4.0;
+const SHORTEST_MOVE: f64 = 4.0;
 /// Largest ratio of successive levels. The points before predict drive and frequency of the next one; where it is farther away, the error of the
 /// prediction moves the response past a fold. Levels between are held, but no points.
 const LARGEST_STEP: f64 = 1.5;
@@ -239,7 +239,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         } else {
             self.run.samples.clear();
         }
-        let late = self.followed(level) + FIRST * usize::from(self.states.is_empty());
+        let late = self.followed(level) + FIRST_PERIODS * usize::from(self.states.is_empty());
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
@@ -253,7 +253,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
                 estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.response, level));
             // The halves of a transient can agree by chance.
             confirmed = if is_met { confirmed + 1 } else { 0 };
-            if cycles.len() >= LONGEST || confirmed >= CONFIRMED {
+            if cycles.len() >= LONGEST_SETTLING || confirmed >= CONFIRMED {
                 break estimate;
             }
         };
@@ -280,14 +280,14 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let Knowledge { shaker, ringing, .. } = self.plan.knowledge;
         // Both roots of the control of a shaker are at half of its bandwidth.
         let of_control = |path: ShakerPath| FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * path.speed);
-        let of_control = shaker.map_or(0.0, of_control).min(LONGEST as f64).ceil();
+        let of_control = shaker.map_or(0.0, of_control).min(LONGEST_SETTLING as f64).ceil();
         let [from, ..] = self.states.last().unwrap_or(&self.closed);
         let share = (level / from - 1.0).abs() / self.plan.precision;
-        let rung_down = (ringing * share.ln()).clamp(0.0, LONGEST as f64).ceil();
+        let rung_down = (ringing * share.ln()).clamp(0.0, LONGEST_SETTLING as f64).ceil();
         FOLLOWED.max(of_control as usize).max(rung_down as usize)
     }
 
-    /// The move to a level, m, and its periods: [`MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and
+    /// The move to a level, m, and its periods: [`SHORTEST_MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and
     /// after the middle, as many as the control of the force needs to correct an error.
     fn step(&self, level: f64) -> (Move, f64) {
         let omega0 = self.plan.knowledge.linear.omega0;
@@ -299,7 +299,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             .knowledge
             .shaker
             .map_or(0.0, |path| 2.0 * OFF / (TAU * path.speed));
-        let periods = MOVE.max(2.0 * slowest) + late;
+        let periods = SHORTEST_MOVE.max(2.0 * slowest) + late;
         let expected = extrapolated(&self.states, level);
         let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);
         let to = Move {

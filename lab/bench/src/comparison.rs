@@ -158,7 +158,7 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
 // Distance of measured points from the exact backbone.
 
 /// Orbits of the curve of one oscillator: the error of the polygon is below 1e-5.
-const POINTS: usize = 3000;
+const OSCILLATOR_ORBITS: usize = 3000;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
@@ -234,7 +234,10 @@ impl ExactCurve {
             curve.points.retain(|orbit| orbit.b >= flow.manifold.b_min());
             curve.points
         };
-        let curves: Vec<_> = backbone(scene, None, POINTS).into_iter().map(beyond_fold).collect();
+        let curves: Vec<_> = backbone(scene, None, OSCILLATOR_ORBITS)
+            .into_iter()
+            .map(beyond_fold)
+            .collect();
         let middle = flow.backbone_at(0.5 * (flow.manifold.b_min() + B_SYMMETRY_BREAKING));
         Self::nearest(ExactOrbits::of_oscillator(scene), &curves, [middle.sigma, middle.c])
     }
@@ -298,7 +301,7 @@ impl ExactCurve {
         let differences = [sigma - same.sigma, g - same.g];
         // The curve there, as straight as it is over the difference.
         let largest = differences[0].abs().max(differences[1].abs());
-        let beside = at(c * (1.0 + BESIDE), [same.sigma, same.b]);
+        let beside = at(c * (1.0 + DIRECTION_STEP), [same.sigma, same.b]);
         let nearest = beside.map_or(polygon, |beside| {
             let from = [same.c, same.sigma, same.g];
             let tangent = [beside.c - same.c, beside.sigma - same.sigma, beside.g - same.g];
@@ -315,7 +318,7 @@ impl ExactCurve {
 }
 
 /// Relative difference in C of the orbit that gives the direction of the curve.
-const BESIDE: f64 = 1e-5;
+const DIRECTION_STEP: f64 = 1e-5;
 
 /// The places, interpolated linearly at their first value `c`, in the last pair around it.
 fn at<const N: usize>(places: &[[f64; N]], c: f64) -> Option<[f64; N]> {

@@ -85,15 +85,15 @@ type Unknowns = SVector<f64, UNKNOWNS>;
 type Covariance = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// Step of a difference, relative or, of zeta and r, absolute: the curve is exact to 1e-13, and smooth.
-const STEP: f64 = 1e-6;
+const CURVE_DIFFERENCE: f64 = 1e-6;
 /// Restitution coefficients from which the minimisation begins: chi-square may have several minima.
-const STARTS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
+const FIRST_RESTITUTIONS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
 /// Number of half-widths that are tried at the start of a search.
 const WIDTHS: usize = 8;
 /// Relative error of first-order theory: of the drive, and of the detuning.
 const THEORY: f64 = 0.04;
 /// Gain of a further step, relative to one and chi-square, at which a minimum counts as found.
-const FOUND: f64 = 1e-9;
+const CURVE_GAIN: f64 = 1e-9;
 /// Smallest and largest values of the unknowns.
 const LIMITS: [[f64; 2]; UNKNOWNS] = {
     let mut limits = [[f64::NEG_INFINITY, f64::INFINITY]; UNKNOWNS];
@@ -104,11 +104,11 @@ const LIMITS: [[f64; 2]; UNKNOWNS] = {
 /// Numbers of the largest or the smallest responses without which the fit is tried.
 const TRIMMED: [usize; 4] = [1, 2, 4, 8];
 /// Probability at which points that belong to the motion are left out, for all choices together.
-const FALSE_ALARM: f64 = 1e-3;
+const POINT_FALSE_ALARM: f64 = 1e-3;
 /// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.
 const NEAREST: f64 = 1e-12;
 /// Fewest points: two equations each for five parameters, and one to spare.
-const FEWEST: usize = 3;
+const FEWEST_POINTS: usize = 3;
 /// Probability of a larger chi-square below which the model is rejected.
 const REJECTED: f64 = 0.01;
 /// The share of the points that may be left out is the inverse of this.
@@ -160,7 +160,11 @@ fn range_of(x: &Unknowns, definition: Definition) -> Option<[f64; 2]> {
 fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
     Unknowns::from_fn(|i, _| {
         // The strength of an effect may be small, and is not negative.
-        let step = if i == 6 && x[6] != 0.0 { STEP * x[6] } else { STEP };
+        let step = if i == 6 && x[6] != 0.0 {
+            CURVE_DIFFERENCE * x[6]
+        } else {
+            CURVE_DIFFERENCE
+        };
         let [below, above] = [-step, step].map(|step| of(&shifted(x, i, step)));
         (above - below) / (2.0 * step)
     })
@@ -168,7 +172,7 @@ fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
 
 /// Derivative by a step.
 fn slope(at: impl Fn(f64) -> Option<Vector3<f64>>) -> Option<Vector3<f64>> {
-    Some((at(STEP)? - at(-STEP)?) / (2.0 * STEP))
+    Some((at(CURVE_DIFFERENCE)? - at(-CURVE_DIFFERENCE)?) / (2.0 * CURVE_DIFFERENCE))
 }
 
 fn shifted(x: &Unknowns, i: usize, step: f64) -> Unknowns {
@@ -181,7 +185,9 @@ fn shifted(x: &Unknowns, i: usize, step: f64) -> Unknowns {
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum FitError {
-    #[error("{0} points are too few for the five parameters: at least {FEWEST} at different amplitudes are needed")]
+    #[error(
+        "{0} points are too few for the five parameters: at least {FEWEST_POINTS} at different amplitudes are needed"
+    )]
     TooFew(usize),
     #[error("point {number}: {what} = {value} ± {uncertainty}: both must be finite, and above 0")]
     NotPositive {
@@ -363,7 +369,7 @@ fn probability(chi_square: f64, degrees: f64) -> Option<f64> {
 
 /// The points, if they are enough and their numbers are positive.
 fn checked(points: &[MeasuredPoint]) -> Result<Vec<MeasuredPoint>, FitError> {
-    if points.len() < FEWEST {
+    if points.len() < FEWEST_POINTS {
         return Err(FitError::TooFew(points.len()));
     }
     for (n, point) in points.iter().enumerate() {
@@ -535,7 +541,7 @@ impl<'a> Problem<'a> {
 
     /// Whether `count` points are enough for a fit, and the points left out are at most a fifth of all.
     fn may_keep(&self, count: usize) -> bool {
-        count >= FEWEST && (self.points.len() - count) * LEFT_OUT <= self.points.len()
+        count >= FEWEST_POINTS && (self.points.len() - count) * LEFT_OUT <= self.points.len()
     }
 
     /// The points of `kept` that remain without those that do not belong to them, and their fit; `None` where all belong.
@@ -571,7 +577,7 @@ impl<'a> Problem<'a> {
             Some((p, rest, next))
         });
         let (p, rest, next) = ends.chain(worst).min_by(|first, second| first.0.total_cmp(&second.0))?;
-        (p < FALSE_ALARM).then_some((rest, next))
+        (p < POINT_FALSE_ALARM).then_some((rest, next))
     }
 
     /// Bound of the probability that, if all points belong to the motion, leaving out as many of them lowers chi-square by more in any of `choices`
@@ -601,7 +607,7 @@ impl<'a> Problem<'a> {
     /// The smallest of the minima that are reached from several restitution coefficients.
     fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
         self.fit_from(
-            STARTS
+            FIRST_RESTITUTIONS
                 .into_iter()
                 .filter_map(|restitution| self.start(&Parameters { restitution, ..*expected })),
         )
@@ -609,7 +615,7 @@ impl<'a> Problem<'a> {
 
     /// The smallest of the minima that are reached from these starts.
     fn fit_from(&self, starts: impl Iterator<Item = Unknowns>) -> Result<Fit, FitError> {
-        let minima = starts.filter_map(|x| LeastSquares::minimum(self, x, &Vec::new(), FOUND));
+        let minima = starts.filter_map(|x| LeastSquares::minimum(self, x, &Vec::new(), CURVE_GAIN));
         let minimum = minima
             .min_by(|first, second| first.chi_square.total_cmp(&second.chi_square))
             .ok_or(FitError::NoMotion)?;

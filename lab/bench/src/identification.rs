@@ -18,10 +18,10 @@ use vines_scene::plan::Plan;
 use vines_scene::scene::Measurand;
 
 pub use asked::Departure;
-pub use decay::{DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, WINDOW, decay_points, harmonic};
+pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
 pub(crate) use decay::{PER_PERIOD, base_at_rest};
 pub use level::{Criterion, LevelEstimate, Unsteady};
-pub(crate) use level::{LAG, LONGEST, is_off_target};
+pub(crate) use level::{LAG, LONGEST_SETTLING, is_off_target};
 pub use resonance_fit::{Cycle, ResonanceFit};
 pub(crate) use response::{ASYMMETRIC, Line, classify, degrees, subharmonic, without_tones};
 pub use response::{Tone, drive_harmonics, foreign_tone, impacts, regime_by_response};
@@ -135,7 +135,7 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     Ok(Identification {
         knowledge,
         lock,
-        decay: decay_points(record, &knowledge, WINDOW),
+        decay: decay_points(record, &knowledge, DECAY_WINDOW),
         base_after_release: base_at_rest(record, &knowledge).err(),
     })
 }
@@ -238,11 +238,11 @@ impl Lock {
 }
 
 /// Largest number of periods before the release that are evaluated.
-const MOST: f64 = 240.0;
+const MOST_EVALUATED: f64 = 240.0;
 /// Largest relative deviation from the amplitude of the hold, in addition to noise, of the periods from which the lock is evaluated.
 const SPREAD: f64 = 0.008;
 /// Smallest disturbance of a motion, relative to the response: less than the noise of any rig.
-const SMALLEST: f64 = 1e-6;
+const SMALLEST_DISTURBANCE: f64 = 1e-6;
 /// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
 pub(crate) const PHASE_RANGE: f64 = 0.1;
 
@@ -293,7 +293,7 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),
-        unseen_growth: (SPREAD / SMALLEST).powf(1.0 / approach.len() as f64) - 1.0,
+        unseen_growth: (SPREAD / SMALLEST_DISTURBANCE).powf(1.0 / approach.len() as f64) - 1.0,
         periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
         held: record.held,
         impacts_per_period,
@@ -316,7 +316,7 @@ pub(crate) fn mean_command(samples: &[Sample], knowledge: &Knowledge) -> Option<
 
 /// The last periods before the release.
 fn before_release(record: &Record, knowledge: &Knowledge) -> Vec<Cycle> {
-    let most = knowledge.samples(MOST);
+    let most = knowledge.samples(MOST_EVALUATED);
     let samples = &record.samples[record.hold_end.saturating_sub(most.max(record.hold().len()))..record.hold_end];
     Cycle::all(samples, record.sample_time, knowledge.target)
 }
@@ -435,7 +435,7 @@ impl ResonancePoint {
 /// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
 const LEFT: f64 = 0.1;
 /// Steps of a converter below which the scatter of a response says nothing.
-const STEPS: f64 = 8.0;
+const CONVERTER_STEPS: f64 = 8.0;
 
 /// Refuses a lock whose phase is farther from its target than the tolerance of the lock, rad.
 fn on_target(lock: &Lock, tolerance: f64) -> Result<(), IdentificationError> {
@@ -472,7 +472,7 @@ fn sensors_after_release(record: &Record, knowledge: &Knowledge) -> Result<(), I
         Some(_) => 0.0,
         None => LEFT * (-2.0 * TAU * linear.damping_rate / linear.omega0).exp(),
     };
-    let is_lost = |three: &[f64]| three[0] > STEPS * step && three[2] <= left * three[0];
+    let is_lost = |three: &[f64]| three[0] > CONVERTER_STEPS * step && three[2] <= left * three[0];
     match scatters.windows(3).position(is_lost) {
         Some(n) => failed((n + 1) * period, "stops reading the response"),
         None => Ok(()),

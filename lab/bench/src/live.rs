@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 
 use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
-use crate::identification::{PER_PERIOD, WINDOW, harmonic};
+use crate::identification::{DECAY_WINDOW, PER_PERIOD, harmonic};
 use vines_scene::plan::DECAYED;
 
 /// Impacts that are kept to determine the regime from.
-const KEPT: usize = 40;
+const IMPACTS_KEPT: usize = 40;
 /// Periods without an impact after which there are none.
 const QUIET: f64 = 20.0;
 /// Smallest number of impacts that a regime is determined from.
@@ -22,7 +22,7 @@ pub struct LastImpacts(pub Vec<Impact>);
 impl LastImpacts {
     /// Forgets all impacts but the last forty.
     pub fn trim(&mut self) {
-        let surplus = self.0.len().saturating_sub(KEPT);
+        let surplus = self.0.len().saturating_sub(IMPACTS_KEPT);
         self.0.drain(..surplus);
     }
 
@@ -99,7 +99,7 @@ impl Decay {
         }
         if self.window == 0 {
             let period = TAU / self.motion.omega / sample_time;
-            self.window = (WINDOW * period).round() as usize + 1;
+            self.window = (DECAY_WINDOW * period).round() as usize + 1;
             self.stride = ((period / PER_PERIOD).round() as usize).max(1);
         }
         self.values.push(response);

@@ -25,7 +25,7 @@ const SHARES: [f64; 2] = [0.01, 0.01 / 16.0];
 /// Factor by which the drive is raised at a time: a fault that noise has hidden is seen at little more.
 const RAISE: f64 = 4.0;
 /// Numbers of periods: without a drive, with it, and evaluated at the end of it.
-const PERIODS: [usize; 3] = [2, 24, 4];
+const CHECK_PERIODS: [usize; 3] = [2, 24, 4];
 
 /// Result of the check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -120,7 +120,7 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     let (omega, amplitude) = (plan.lock.omega_start, share * plan.amplitude);
     let step = plan.knowledge.sample_time;
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
-    let [quiet, driven, window] = PERIODS.map(samples);
+    let [quiet, driven, window] = CHECK_PERIODS.map(samples);
     let target = plan.knowledge.target;
     let mut rig = Scaled::new(rig, target);
     let mut rig = OpenLoop::new(&mut rig, target, step);
@@ -260,7 +260,7 @@ fn without_drift(readings: &mut [[f64; 3]]) {
 fn expected(plan: &Plan) -> [Complex64; 2] {
     let omega = plan.lock.omega_start;
     let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
-    let time = (PERIODS[1] as f64 - 0.5 * PERIODS[2] as f64) * TAU / omega;
+    let time = (CHECK_PERIODS[1] as f64 - 0.5 * CHECK_PERIODS[2] as f64) * TAU / omega;
     let rate = Complex64::new(damping_rate, omega - omega0);
     let growth = Complex64::new(0.0, -0.5 * omega0) * (1.0 - (-rate * time).exp()) / rate;
     // A delay that the chain states is expected.
@@ -706,7 +706,7 @@ impl Linear {
         let turn = Complex64::cis(-2.0 * omega * period);
         let (mut q, [mut steady, mut initial]) = start(phasors)?;
         let [mut u_q, mut u_gain, mut per_noise] = [f64::NAN; 3];
-        for _ in 0..ROUNDS {
+        for _ in 0..NEWTON_STEPS {
             let (mut power, mut turned, mut rest) = (Complex64::ONE, Complex64::ONE, 0.0);
             let p = q.conj().powf(1.0 / samples as f64);
             let within = (1.0 - p) / (1.0 - p * Complex64::cis(-4.0 * PI / samples as f64));
@@ -766,7 +766,7 @@ const FROM_REST: f64 = 0.5;
 /// Largest relative standard uncertainty of the gain of a response that is more than noise.
 const DETERMINED: f64 = 0.1;
 /// Number of steps of Newton's method; each squares the relative error.
-const ROUNDS: usize = 8;
+const NEWTON_STEPS: usize = 8;
 
 /// First values of `q`, and of `s` and `a`, by the recursion `z' = q z + (1 - q) s` from period to period. `None` without a growth.
 fn start(phasors: &[Complex64]) -> Option<(Complex64, [Complex64; 2])> {

@@ -12,7 +12,7 @@ use crate::fit::{self, Contradiction, MeasuredPoint};
 use vines_scene::scene::{Scene, Structure};
 
 /// Orbits on a curve.
-const POINTS: usize = 400;
+const CURVE_ORBITS: usize = 400;
 /// Detunings of one oscillator's backbone.
 pub const DETUNINGS: [f64; 2] = [-6.0, 6.0];
 
@@ -47,7 +47,7 @@ pub struct BehindShaker {
 
 impl Survey {
     /// Number of orbits that are tried where the backbone is one curve.
-    pub const ORBITS: usize = 2 * POINTS;
+    pub const ORBITS: usize = 2 * CURVE_ORBITS;
 
     /// The survey of a scene's structure; `None` without one.
     pub fn of(scene: &Scene) -> Option<Self> {
@@ -58,7 +58,7 @@ impl Survey {
     pub fn with(scene: &Scene, progress: &dyn Fn()) -> Option<Self> {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
         let driven = section_of(structure);
-        let facts = orbits.facts(driven, scene.frequencies(), POINTS, progress)?;
+        let facts = orbits.facts(driven, scene.frequencies(), CURVE_ORBITS, progress)?;
         let [low, high] = scene.frequencies();
         let [least, most] = SEARCHED.map(|share| share * scene.plant.natural_frequency());
         Some(Self {
@@ -137,7 +137,9 @@ pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
 pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
     let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
     // Other modes may have the motion that the loop finds.
-    let range = orbits.range(section_of(structure), POINTS)?.with(scene.frequencies());
+    let range = orbits
+        .range(section_of(structure), CURVE_ORBITS)?
+        .with(scene.frequencies());
     let told = |orbit: &StructureOrbit| of_driven_mode(orbit, structure, numbers);
     let curves = orbits.backbone(&range).into_iter();
     Some(curves.map(|branch| branch.orbits.iter().map(told).collect()).collect())
@@ -147,7 +149,9 @@ pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<
 pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
     let of_structure = || {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
-        let range = orbits.range(section_of(structure), POINTS)?.with(scene.frequencies());
+        let range = orbits
+            .range(section_of(structure), CURVE_ORBITS)?
+            .with(scene.frequencies());
         let branches = orbits.backbone(&range);
         let stable = branches
             .iter()
@@ -156,7 +160,7 @@ pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
         Some(stable.map(|orbit| of_driven_mode(orbit, structure, numbers)).collect())
     };
     let alone = || {
-        orbit::stable_backbone(numbers, DETUNINGS, POINTS)
+        orbit::stable_backbone(numbers, DETUNINGS, CURVE_ORBITS)
             .into_iter()
             .flatten()
             .collect()
@@ -209,7 +213,7 @@ pub fn structure_curves(
     is_response: bool,
 ) -> Option<Vec<OrbitCurve>> {
     let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
-    let range = StructureRange::at_any_speed(numbers, sigma, POINTS);
+    let range = StructureRange::at_any_speed(numbers, sigma, CURVE_ORBITS);
     let branches = match is_response {
         true => orbits.frequency_response(scene.structure_drive()?, &range),
         false => orbits.backbone(&range),
@@ -224,7 +228,7 @@ pub fn structure_curves(
 /// Detunings of a structure's backbone and of the frequencies that the controller may set.
 pub fn detunings(scene: &Scene, numbers: &Dimensionless) -> Option<[f64; 2]> {
     let orbits = scene.structure_orbits()?;
-    let range = orbits.range(section_of(scene.structure.as_ref()?), POINTS)?;
+    let range = orbits.range(section_of(scene.structure.as_ref()?), CURVE_ORBITS)?;
     Some(range.with(scene.frequencies()).omega.map(|omega| numbers.sigma(omega)))
 }
 

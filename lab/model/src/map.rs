@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::Dimensionless;
 use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
-use crate::orbit::{NEAR, Periodic, periodic_near};
+use crate::orbit::{Periodic, SETTLING_DISTANCE, periodic_near};
 use crate::oscillator::ForcedOscillator;
 use crate::regime::{Impact, Regime, synchrony};
 
@@ -29,7 +29,7 @@ pub const LIMIT: usize = 20_000;
 pub const CONFIRMATIONS: usize = 6;
 
 /// Periods after which the motion is examined for the first time; from then on whenever their number has grown by a quarter.
-const FIRST: usize = 16;
+const FIRST_EXAMINED: usize = 16;
 
 /// Drives the dimensionless plant of `scene` at the detuning `sigma` from `start` = (q1, q1', q2, q2') until its regime is decided, for
 /// at most `limit` periods. A motion that settles on a periodic one, or cannot reach a wall, is decided earlier.
@@ -42,7 +42,7 @@ pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize)
 
 /// Distance between the starts of motions that must agree: far above rounding, and magnified by chaos to order one in ln(1e9) = 21 Lyapunov
 /// times.
-const APART: f64 = 1e-9;
+const START_DISTANCE: f64 = 1e-9;
 /// Transient, periods, from which on it may be chaos that ends at random: on the default scene,
 /// the free motion of the primary mass decays by exp(pi epsilon lambda 500) = e^19 within it.
 const LATE: f64 = 500.0;
@@ -65,7 +65,7 @@ pub fn observe_confirmed(
     };
     for n in 1..=count {
         let [q1, dq1, q2, dq2] = start;
-        let regime = observe(scene, sigma, [q1, dq1 + n as f64 * APART, q2, dq2], limit)?.regime;
+        let regime = observe(scene, sigma, [q1, dq1 + n as f64 * START_DISTANCE, q2, dq2], limit)?.regime;
         if regime != result.regime {
             return Ok((result, Some(regime)));
         }
@@ -147,7 +147,7 @@ impl CellRun {
 
     /// Follows the motion until its regime is decided, for at most `limit` periods; it is not examined before `first` periods.
     pub fn decided(&mut self, first: usize, limit: usize) -> Result<RegimeResult, InvalidValue> {
-        let mut periods = first.max(FIRST).min(limit);
+        let mut periods = first.max(FIRST_EXAMINED).min(limit);
         loop {
             if self.follow(periods)?.is_break() {
                 return Ok(self.result(Regime::Undecided, 0));
@@ -279,7 +279,7 @@ const SEPARATION: f64 = 1e-8;
 /// Largest number of periods over which it is followed: an exponent of zero is then known to [`ZERO`].
 const OBSERVED: usize = 5000;
 /// Differences below which it repeats: far above rounding, far below what separates two motions.
-const SAME: f64 = 1e-6;
+const REPEAT_DIFFERENCE: f64 = 1e-6;
 /// Longest repetition in the search, periods. The window is a third of it, and at least two repetitions.
 const REPETITION: usize = 96;
 /// Largest uncertainty of an exponent that is called zero, per period.
@@ -313,13 +313,13 @@ impl CellRun {
             let pattern = &orbit.pattern;
             let exponent = (orbit.exponent(), 0.0);
             (regime(orbit), pattern.impacts(), pattern.periods(), exponent)
-        } else if recurrence < SAME {
+        } else if recurrence < REPEAT_DIFFERENCE {
             let impacts = self.counts(n)[0] - self.counts(n - count)[0];
             (Regime::Several, impacts, count as u32, self.exponent()?)
         } else {
             return Ok(None);
         };
-        let begun = |n: &usize| self.distance(*n, count) > NEAR;
+        let begun = |n: &usize| self.distance(*n, count) > SETTLING_DISTANCE;
         Ok((impacts > 0 && exponent.0 < 0.0).then(|| {
             let transient = (count..=n).rev().find(begun).unwrap_or(0);
             RegimeResult {
@@ -367,14 +367,14 @@ impl CellRun {
         let largest = |count: usize, from: usize, to: usize| {
             (from..=to).rev().try_fold(0.0_f64, |largest, n| {
                 let distance = self.distance(n, count);
-                (distance < NEAR).then(|| largest.max(distance))
+                (distance < SETTLING_DISTANCE).then(|| largest.max(distance))
             })
         };
         (1..=REPETITION.min(n / 4)).find_map(|count| {
             let window = (2 * count).max(REPETITION / 3).min(n - count);
             let late = largest(count, n - window / 2, n)?;
             let early = largest(count, n - window, n - window / 2)?;
-            (late <= early.max(SAME)).then_some((count, late))
+            (late <= early.max(REPEAT_DIFFERENCE)).then_some((count, late))
         })
     }
 }
@@ -390,7 +390,7 @@ fn regime(orbit: &Periodic) -> Regime {
 }
 
 /// Steps per period at which the response is read.
-const STEPS: usize = 64;
+const STEPS_PER_PERIOD: usize = 64;
 /// Smallest number of periods over which it is averaged.
 const AVERAGED: usize = 64;
 /// Natural logarithm of the factor by which the distance to a periodic motion shrinks before the response is read: 1e-6.
@@ -422,10 +422,10 @@ impl CellRun {
         let plant = &mut self.plant;
         let (omega, e) = (self.drive.omega, self.drive.amplitude);
         let damping = plant.parameters().damping;
-        let phase = |n: usize| TAU * n as f64 / STEPS as f64;
+        let phase = |n: usize| TAU * n as f64 / STEPS_PER_PERIOD as f64;
         let energy = |plant: &lovines::Plant, n: usize| plant.energy(e * phase(n).sin());
         let before = (energy(plant, 0), plant.totals().dissipated, plant.state().q1);
-        let count = periods * STEPS;
+        let count = periods * STEPS_PER_PERIOD;
         let (mut harmonic, mut work) = ([0.0; 2], 0.0);
         for n in 0..count {
             let (sin, cos) = phase(n).sin_cos();
@@ -434,7 +434,7 @@ impl CellRun {
             // Power of the base, (k (e - q1) + c (e' - q1')) e', with the jumps of q1' integrated by parts.
             let (slope, curvature) = (e * omega * cos, -e * omega * omega * sin);
             work += (e * sin - q1) * slope + damping * (slope * slope + q1 * curvature);
-            plant.advance(self.drive, TAU / (omega * STEPS as f64))?;
+            plant.advance(self.drive, TAU / (omega * STEPS_PER_PERIOD as f64))?;
         }
         let duration = periods as f64 * TAU / omega;
         let ends = damping * (plant.state().q1 - before.2) * e * omega * phase(0).cos();

@@ -59,9 +59,9 @@ pub trait Equations<const N: usize> {
 
 /// Size of the last correction of [`newton`] and, where rounding lets it fall no further, the largest. The unknowns are numbers of order one.
 pub const CONVERGED: f64 = 1e-12;
-const ROUNDING: f64 = 1e-10;
+const CORRECTION_ROUNDING: f64 = 1e-10;
 /// Largest number of corrections, and of halvings of one that does not reduce the residuals.
-const ROUNDS: usize = 30;
+const MOST_CORRECTIONS: usize = 30;
 const HALVINGS: usize = 6;
 
 /// The solution near `x` by Newton's method, in steps that reduce the norm of the residuals. Where the equations leave a direction free, the
@@ -72,10 +72,10 @@ where
 {
     let (mut residual, mut jacobian) = equations.at(&x)?;
     let mut last = f64::INFINITY;
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_CORRECTIONS {
         let correction = solve(jacobian, &residual)?;
         let size = correction.norm();
-        if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
+        if size < CONVERGED || size < CORRECTION_ROUNDING && size > 0.5 * last {
             return Some(x - correction);
         }
         let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
@@ -85,7 +85,7 @@ where
             (at.0.norm() < residual.norm()).then_some((share, next, at))
         });
         let Some((share, next, at)) = next else {
-            return (size < ROUNDING).then_some(x);
+            return (size < CORRECTION_ROUNDING).then_some(x);
         };
         (x, (residual, jacobian), last) = (next, at, size);
         if share == 1.0
@@ -122,7 +122,7 @@ const SINGULAR: f64 = 1e-14;
 /// steps do not become as small, or where `f` is `None`.
 pub fn secant(mut f: impl FnMut(f64) -> Option<f64>, [mut before, mut here]: [f64; 2], tolerance: f64) -> Option<f64> {
     let mut at_before = f(before)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_CORRECTIONS {
         iteration();
         let at_here = f(here)?;
         let step = if at_here == 0.0 {
@@ -296,8 +296,8 @@ pub struct LeastSquares<const N: usize, T> {
     pub trace: T,
 }
 
-/// Largest number of steps of [`LeastSquares::minimum`]; a fit that converges takes about twenty.
-const STEPS: usize = 100;
+/// Largest number of steps of [`LeastSquares::minimum`].
+const MOST_STEPS: usize = 100;
 
 impl<const N: usize, T: Clone> LeastSquares<N, T>
 where
@@ -324,7 +324,7 @@ where
         let mut here = Self::at(model, x, near)?;
         let limits = model.limits();
         let mut damping = 1e-3;
-        for _ in 0..STEPS {
+        for _ in 0..MOST_STEPS {
             let least = tolerance * (1.0 + here.chi_square);
             let (normal, gradient, is_free) = here.free(&limits);
             // Where the matrix is singular some direction is free, and has no step.

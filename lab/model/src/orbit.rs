@@ -22,7 +22,7 @@ use serde::Serialize;
 
 pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
 pub use periodic::{Bifurcation, Condition, Periodic, settle};
-pub(crate) use periodic::{NEAR, periodic_near};
+pub(crate) use periodic::{SETTLING_DISTANCE, periodic_near};
 pub use plant::{
     DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
 };

@@ -174,7 +174,7 @@ pub fn synchrony(impacts: &[Impact]) -> f64 {
 }
 
 /// Relative deviation of an interval from the one before at which the impacts have lost synchrony.
-const LOST: f64 = 0.25;
+const SYNCHRONY_LOST: f64 = 0.25;
 
 /// Time of the last impact in synchrony with a motion whose half period starts as `half_period` and changes slowly: on the
 /// other wall than the impact before, and after an interval about as long as the last one.
@@ -183,7 +183,7 @@ pub fn end_of_synchrony(impacts: &[Impact], half_period: f64) -> Option<f64> {
     let mut end = impacts.first()?.time;
     for pair in impacts.windows(2) {
         let interval = pair[1].time - pair[0].time;
-        if (interval / expected - 1.0).abs() > LOST || !pair[0].on_other_wall(&pair[1]) {
+        if (interval / expected - 1.0).abs() > SYNCHRONY_LOST || !pair[0].on_other_wall(&pair[1]) {
             break;
         }
         expected = interval;

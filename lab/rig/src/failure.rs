@@ -30,24 +30,14 @@ pub enum RigError {
         unit: &'static str,
     },
     #[error(
-        "the shaker does not follow: {asked:.3e} {unit} are asked for, and the measured fundamental is off by {error:.3e} {unit} for {periods:.1} periods; {cause}"
-    )]
-    ReferenceOff {
-        asked: f64,
-        error: f64,
-        periods: f64,
-        unit: &'static str,
-        cause: &'static str,
-    },
-    #[error(
-        "the {} contradicts the command: by the path that the check has measured, command and response give {expected:.3e} {unit}, and {read:.3e} {unit} \
-         are read. Check the amplifier (does it clip?), the stinger, and the {} with its cable",
-        reference_of(unit),
-        sensor_of(unit)
+        "the {} contradicts command and response: by the path that the check has measured, these give {expected:.3e} {unit}, and {read:.3e} {unit} is \
+         read, for {periods:.1} periods",
+        reference_of(unit)
     )]
     PathContradicted {
         expected: f64,
         read: f64,
+        periods: f64,
         unit: &'static str,
     },
     #[error(
@@ -65,15 +55,6 @@ pub enum RigError {
 /// What the control of a shaker reads, by its unit.
 fn reference_of(unit: &str) -> &'static str {
     if unit == "N" { "force" } else { "table" }
-}
-
-/// The sensor of the reference, by its unit.
-fn sensor_of(unit: &str) -> &'static str {
-    if unit == "N" {
-        "force cell"
-    } else {
-        "sensor on the table"
-    }
 }
 
 /// Why a controller cannot go on.

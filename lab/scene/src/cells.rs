@@ -10,7 +10,7 @@ use crate::scene::{Family, Scene, SceneError};
 pub const SIGMA: &str = "sigma";
 
 /// Least and largest number of periods that a cell may be followed. A motion keeps about 100 bytes per period.
-const PERIODS: [usize; 2] = [100, 1_000_000];
+const PERIODS_ALLOWED: [usize; 2] = [100, 1_000_000];
 
 /// Why cells cannot be computed.
 #[derive(Debug, Error)]
@@ -28,7 +28,7 @@ pub enum CellError {
     Sigma(f64),
     #[error("sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0")]
     Frequency { sigma: f64, omega: f64 },
-    #[error("{0} periods: from {least} to {most} are allowed", least = PERIODS[0], most = PERIODS[1])]
+    #[error("{0} periods: from {least} to {most} are allowed", least = PERIODS_ALLOWED[0], most = PERIODS_ALLOWED[1])]
     Periods(usize),
 }
 
@@ -72,7 +72,7 @@ impl Cells {
             None if varies => 0.0,
             None => stable_resonant(&scene.dimensionless()).map_or(0.0, |orbit| orbit.sigma),
         };
-        if !(PERIODS[0]..=PERIODS[1]).contains(&periods) {
+        if !(PERIODS_ALLOWED[0]..=PERIODS_ALLOWED[1]).contains(&periods) {
             return Err(CellError::Periods(periods));
         }
         for key in keys.iter().filter(|key| *key != SIGMA) {

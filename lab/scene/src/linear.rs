@@ -156,7 +156,7 @@ pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
 
 /// Resolution of a stated point: of response and drive, relative, and of the frequency over the half-power bandwidth. No sensor and no drawing shows
 /// more.
-pub const RESOLUTION: f64 = 1e-4;
+pub const POINT_RESOLUTION: f64 = 1e-4;
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -230,9 +230,10 @@ impl LinearResponse {
         2.0 * self.damping_rate.max(0.0) / self.omega0
     }
 
-    /// A point as it is stated: response, m, drive, m, and frequency, rad/s, whose uncertainties contain [`RESOLUTION`].
+    /// A point as it is stated: response, m, drive, m, and frequency, rad/s, whose uncertainties contain [`POINT_RESOLUTION`].
     pub fn resolved(&self, [response, drive, omega]: [Estimate; 3]) -> [Estimate; 3] {
-        let with = |Estimate { value, uncertainty }, unit: f64| Estimate::new(value, &[uncertainty, RESOLUTION * unit]);
+        let with =
+            |Estimate { value, uncertainty }, unit: f64| Estimate::new(value, &[uncertainty, POINT_RESOLUTION * unit]);
         [
             with(response, response.value),
             with(drive, drive.value),

@@ -85,8 +85,8 @@ pub const SECOND: f64 = 0.25;
 pub const BANDWIDTH: f64 = SECOND * DETECTOR;
 /// Number of odd harmonics that both detectors know, as far as they are sampled. Impacts of one period are alternating impulses. A resonance of armature
 /// and stinger can make a harmonic of the force ten times the fundamental: unknown, it would be in the command, and another motion the result.
-pub const HARMONICS: usize = 15;
-/// How many of them change as fast as the fundamental: chosen by trial on random shakers (studies/shakers.rs), a few of which overshoot limits with 1.
+pub const ODD_HARMONICS: usize = 15;
+/// How many of them change as fast as the fundamental: the strongest harmonics of impacts follow a change of the motion.
 const FAST: usize = 3;
 
 /// Rate at which a detector changes a harmonic, by its place among the odd ones, over the rate of the fundamental.
@@ -100,7 +100,7 @@ pub fn speed(path: &ShakerPath, omega0: f64, exact: impl Fn(f64) -> [Complex64; 
     let is_stable = |speed: &f64| {
         let of = |x: f64| return_difference(path, omega0, *speed, x, exact(omega0 * (1.0 + x)));
         let turns: f64 = (-REACH..REACH)
-            .map(|n| turned(&of, [n, n + 1].map(|n| f64::from(n) * GRID), FINEST))
+            .map(|n| turned(&of, [n, n + 1].map(|n| f64::from(n) * DETUNING_STEP), MOST_HALVINGS))
             .sum();
         turns > -PI
     };
@@ -112,10 +112,10 @@ pub fn speed(path: &ShakerPath, omega0: f64, exact: impl Fn(f64) -> [Complex64; 
 }
 
 /// Detunings at which stability is judged, over omega0: a multiple of this to each side, and between where the phase turns fast.
-const GRID: f64 = 0.01;
+const DETUNING_STEP: f64 = 0.01;
 const REACH: i32 = 70;
 /// Number of times that such an interval is halved at most.
-const FINEST: u32 = 12;
+const MOST_HALVINGS: u32 = 12;
 
 /// Phase by which a function turns between two points, rad.
 fn turned(of: &impl Fn(f64) -> Complex64, [begin, end]: [f64; 2], finest: u32) -> f64 {
@@ -139,7 +139,7 @@ fn return_difference(
     let s = Complex64::new(0.0, x);
     let [observer, detector, bandwidth] = [OBSERVER, DETECTOR, BANDWIDTH].map(|bandwidth| bandwidth * speed);
     // What offset and harmonics of a detector take of what it reads; the fundamental is at x = 0.
-    let orders = (0..HARMONICS).flat_map(|n| [1.0, -1.0].map(|sign| (n, sign * (2 * n + 1) as f64)));
+    let orders = (0..ODD_HARMONICS).flat_map(|n| [1.0, -1.0].map(|sign| (n, sign * (2 * n + 1) as f64)));
     let others = orders.filter(|(_, order)| *order != 1.0);
     let comb: Complex64 = others
         .map(|(n, order)| rate_of(n) / Complex64::new(0.0, 1.0 + x - order))

@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         .unwrap_or(DETUNINGS);
     if arguments.backbone {
         let of_structure = structure_curves(&loaded, &scene, range, false);
-        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), POINTS));
+        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), CURVE_ORBITS));
         return shown(&scene, "Exact backbone", &curves, arguments.json, || listed(&curves)).map(Results::from);
     }
     if loaded.structure.is_some() {
@@ -169,7 +169,7 @@ fn of_a_structure(arguments: &Arguments, scene: &Scene, range: [f64; 2]) -> Resu
 }
 
 /// Orbits on a curve.
-const POINTS: usize = 400;
+const CURVE_ORBITS: usize = 400;
 
 /// All components of the frequency response.
 fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<Results, Failure> {

@@ -15,7 +15,7 @@ use vines::{FileError, create_folder_of};
 use super::tap::Tap;
 
 /// Time between two writes. What was recorded since the last one is lost if the process is killed.
-const PACE: Duration = Duration::from_millis(100);
+const WRITE_INTERVAL: Duration = Duration::from_millis(100);
 /// Longest text of a write, about: a simulation may be faster than its recording.
 const BLOCK: usize = 1 << 20;
 
@@ -105,7 +105,7 @@ fn write(mut file: File, samples: &Receiver<Sample>, headings: &str) -> io::Resu
             return Ok(has_begun);
         }
         if rows.len() < BLOCK {
-            thread::sleep(PACE);
+            thread::sleep(WRITE_INTERVAL);
         }
     }
 }

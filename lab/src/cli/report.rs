@@ -89,7 +89,7 @@ const SECTIONS: [Section; 6] = [
 ];
 
 /// Of a structure, in place of the regimes, which are those of one oscillator.
-const STRUCTURE: Section = (
+const STRUCTURE_SECTION: Section = (
     "Modes and stability",
     "structure --figure OUT/structure.svg",
     "The modes, and where the exact backbone is stable with the driven mode alone and with all modes.",
@@ -131,7 +131,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut sections = Vec::new();
     for section in SECTIONS {
         let is_map = section.1.starts_with("map ");
-        let (title, line, shows, figures) = if is_map && is_structure { STRUCTURE } else { section };
+        let (title, line, shows, figures) = if is_map && is_structure {
+            STRUCTURE_SECTION
+        } else {
+            section
+        };
         // The detunings are those of the structure.
         let line = if is_structure {
             line.replace(" --range=-5:5", "")

@@ -2,7 +2,7 @@
 //!
 //! One thread waits for a signal. A command that has something to end (a driven rig, a server, files that are being written) holds an
 //! [`Orderly`]: it looks at the flag of [`stop_flag`], and ends by itself with what it has. The thread ends any other command at once. If an orderly
-//! command has not ended after [`PATIENCE`], something does not answer, such as an FMU or a device. The thread then commands a drive of zero itself,
+//! command has not ended after [`ORDERLY_END`], something does not answer, such as an FMU or a device. The thread then commands a drive of zero itself,
 //! unless it is the rig that does not answer, says whether it could, and ends the program.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
@@ -17,7 +17,7 @@ use vines::rig::{Drive, GroundTruth, Rig, RigError, Sensors};
 /// Time between two looks for a signal.
 const LOOK: Duration = Duration::from_millis(20);
 /// Time that an orderly command has for its end, and time for the thread's own drive of zero: together below two seconds on a busy machine, too.
-const PATIENCE: Duration = Duration::from_millis(1000);
+const ORDERLY_END: Duration = Duration::from_millis(1000);
 const LAST: Duration = Duration::from_millis(400);
 
 static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
@@ -69,7 +69,7 @@ fn wait() {
     if ORDERLY.load(SeqCst) > 0 {
         let began = Instant::now();
         // A second signal ends the program at once.
-        while began.elapsed() < PATIENCE && process::signal().is_none_or(|(_, count)| count == 1) {
+        while began.elapsed() < ORDERLY_END && process::signal().is_none_or(|(_, count)| count == 1) {
             thread::sleep(LOOK);
         }
     }

@@ -27,7 +27,7 @@ Examples:
   vines theory --json > theory.json";
 
 /// Samples of the backbone in JSON.
-const SAMPLES: usize = 200;
+const BACKBONE_SAMPLES: usize = 200;
 
 /// Print first-order theory: invariant manifold, solutions at phase resonance, backbone
 #[derive(Debug, Args)]
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         "sigma": sigma,
         "activation": activation,
         "equilibria": equilibria.clone().unwrap_or_default(),
-        "backbone": backbone(&scene, highest / SAMPLES as f64, highest, SAMPLES),
+        "backbone": backbone(&scene, highest / BACKBONE_SAMPLES as f64, highest, BACKBONE_SAMPLES),
     });
     let text = output(arguments.json, &result, || {
         let rows = solutions.iter().map(|point| {

@@ -33,13 +33,13 @@ const CHANNEL: usize = 1 << 16;
 /// Rows per natural period that are shown, at most.
 const PER_PERIOD: f64 = 50.0;
 /// Rows that a browser gets that comes late: more than the last minute of the default scene.
-const KEPT: usize = 30_000;
+const ROWS_KEPT: usize = 30_000;
 /// Points of the drop-out: several per half-power bandwidth of a light structure.
 const DROP_OUT: usize = 1200;
 /// Time between two evaluations of the samples.
-const PACE: Duration = Duration::from_millis(40);
+const EVALUATION_INTERVAL: Duration = Duration::from_millis(40);
 /// Longest wait for the rest of a request, and for a browser that does not read.
-const PATIENCE: Duration = Duration::from_secs(2);
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Args)]
 pub(super) struct WatchArguments {
@@ -199,7 +199,7 @@ impl View {
         if sample.number.is_multiple_of(stride) {
             self.rows.push_back(row);
         }
-        if self.rows.len() > KEPT {
+        if self.rows.len() > ROWS_KEPT {
             self.rows.pop_front();
             self.first += 1;
         }
@@ -378,7 +378,7 @@ macro_rules! files {
         )),*]
     };
 }
-const FILES: &[(&str, &str)] = files!(
+const PAGE_FILES: &[(&str, &str)] = files!(
     index.html style.css controls.js link.js main.js map.js module.js page.js pictures.js plots.js record.js rig.js sound.js story.js strip.js
     watch.js
 );
@@ -397,7 +397,7 @@ fn serve(listener: &TcpListener, address: SocketAddr, messages: &Receiver<Messag
     let (mut browsers, mut silent) = (Vec::new(), Vec::new());
     let mut outcome = Value::Null;
     while outcome.is_null() {
-        thread::sleep(PACE);
+        thread::sleep(EVALUATION_INTERVAL);
         for message in messages.try_iter() {
             match message {
                 Message::Sample(sample) => view.take(sample),
@@ -427,8 +427,8 @@ fn is_silent(stream: &TcpStream) -> bool {
 /// Answers one request. Returns the stream of a browser that asks for the rows.
 fn answer(mut stream: TcpStream, address: SocketAddr, table: &str) -> io::Result<Option<TcpStream>> {
     stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_read_timeout(Some(REQUEST_TIMEOUT))?;
+    stream.set_write_timeout(Some(REQUEST_TIMEOUT))?;
     // A request of this page has less than a kilobyte.
     let head: Vec<String> = BufReader::new((&stream).take(1 << 14))
         .lines()
@@ -452,7 +452,7 @@ fn answer(mut stream: TcpStream, address: SocketAddr, table: &str) -> io::Result
         ),
         (Some("GET"), "/rows") => ("200 OK", "text/event-stream", ""),
         (Some("GET"), "/settings.json") => ("200 OK", "application/json", table),
-        (Some("GET"), _) => match FILES.iter().find(|(name, _)| *name == path) {
+        (Some("GET"), _) => match PAGE_FILES.iter().find(|(name, _)| *name == path) {
             Some((name, text)) => ("200 OK", kind(name), *text),
             None => ("404 Not Found", "text/plain", "no such file"),
         },

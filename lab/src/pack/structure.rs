@@ -12,7 +12,7 @@ use lovines::table::PARAMETERS;
 use phase_lock::Value;
 use serde_json::json;
 
-use super::{Component, STARTS};
+use super::{Component, START_PARAMETERS};
 use crate::scene::{ARMATURE, Channel, Excitation, Scene, SceneShaker, Structure, TABLE};
 use crate::table::Table;
 
@@ -43,7 +43,7 @@ pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -
         channels: structure.channels(),
         starts,
         step,
-        stop: PERIODS * TAU / structure.mode().omega,
+        stop: STRUCTURE_PERIODS * TAU / structure.mode().omega,
     };
     let xml = describe(&oscillator.xml, &facts)?;
     Ok(Component {
@@ -58,7 +58,7 @@ pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -
 }
 
 /// The end of the default experiment, periods of the driven mode.
-const PERIODS: f64 = 100.0;
+const STRUCTURE_PERIODS: f64 = 100.0;
 
 /// What the description cannot say, as HTML; `step` is that of the default experiment, s.
 fn page(structure: &Structure, step: f64) -> Cow<'static, str> {
@@ -149,8 +149,8 @@ fn resource(structure: &Structure, starts: &[(&str, f64)], interval: f64) -> Vec
     text
 }
 
-/// Value reference of the first output at a point. Those of point n are `FIRST + 3 n` for its displacement, velocity and acceleration.
-const FIRST: u32 = 1000;
+/// Value reference of the first output at a point. Those of point n are `FIRST_POINT_REFERENCE + 3 n` for its displacement, velocity and acceleration.
+const FIRST_POINT_REFERENCE: u32 = 1000;
 
 /// The outputs at a point: symbol, quantity, declared type, unit with its display unit.
 const QUANTITIES: [(&str, &str, &str, [&str; 2]); 3] = [
@@ -331,7 +331,7 @@ fn variables_of(oscillator: Vec<Element>, facts: &Facts<'_>) -> Vec<Element> {
         let mut add = |k: usize, name: &str, meaning: &str, content: Element| {
             let attributes: [(&str, &dyn Display); 6] = [
                 ("name", &name),
-                ("valueReference", &(FIRST as usize + 3 * n + k)),
+                ("valueReference", &(FIRST_POINT_REFERENCE as usize + 3 * n + k)),
                 ("causality", &"output"),
                 ("variability", &"continuous"),
                 ("initial", &"calculated"),
@@ -386,7 +386,7 @@ fn adapt(variable: &mut Element, facts: &Facts<'_>) {
         return;
     }
     // A start has the same value under both of its names.
-    let output = STARTS.iter().find(|(_, parameter)| *parameter == name);
+    let output = START_PARAMETERS.iter().find(|(_, parameter)| *parameter == name);
     let name = output.map_or(&*name, |(output, _)| output);
     if let Some((_, start)) = facts.starts.iter().find(|(other, _)| *other == name) {
         variable.children[0].set("start", start);

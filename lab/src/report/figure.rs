@@ -24,7 +24,7 @@ const MARGINS: [f64; 4] = [66.0, 54.0, 16.0, 10.0];
 /// Height of a line of the legend, and width of its sample, px.
 const ENTRY: (f64, f64) = (21.0, 32.0);
 /// Points of a curve that are closer than this, px, are drawn as one.
-const APART: f64 = 0.4;
+const NEIGHBOUR_DISTANCE: f64 = 0.4;
 
 /// Rows of panels under a title and lines of a caption.
 pub struct Figure {
@@ -265,7 +265,9 @@ impl Series {
             Shape::Line(_) | Shape::Dashed(_) => {
                 let mut points: Vec<[f64; 2]> = Vec::new();
                 for (n, [x, y]) in places.iter().copied().enumerate() {
-                    let far = points.last().is_none_or(|[a, b]| (x - a).hypot(y - b) >= APART);
+                    let far = points
+                        .last()
+                        .is_none_or(|[a, b]| (x - a).hypot(y - b) >= NEIGHBOUR_DISTANCE);
                     if far || n + 1 == places.len() {
                         points.push([x, y]);
                     }

@@ -20,7 +20,7 @@ use crate::survey::Survey;
 use crate::theory::{self, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, reading};
 
 /// Points of a computed curve: at this figure size, neighbours are at most a few pixels apart.
-const POINTS: usize = 400;
+const CURVE_POINTS: usize = 400;
 /// Only every fourth point along the decay is drawn, so that the circles do not overlap.
 const THINNED: usize = 4;
 /// Heights of a single row of panels and of each of two, px.
@@ -79,7 +79,7 @@ fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, verti
 fn theory_backbone(p: &Dimensionless, top: f64, place: impl Fn(&BackbonePoint) -> Place) -> Vec<Marked> {
     let manifold = SlowFlow::new(p.lambda, p.r).manifold;
     let last = manifold.b(top, BranchSide::Right).unwrap_or(1.0);
-    let points = theory::backbone(p, manifold.b_min(), last, POINTS);
+    let points = theory::backbone(p, manifold.b_min(), last, CURVE_POINTS);
     points.iter().map(|point| (place(point), point.stable())).collect()
 }
 
@@ -134,15 +134,15 @@ pub fn backbone(result: &Comparison) -> Figure {
 }
 
 /// Range of the particle speed on figures of the manifold: beyond the stable range.
-const FASTEST: f64 = 1.4;
+const FASTEST_PARTICLE: f64 = 1.4;
 
 /// A panel with the slow invariant manifold: amplitude over particle speed, the axes of the study.
 fn manifold_panel(p: &Dimensionless, top: f64) -> Panel {
     let flow = SlowFlow::new(p.lambda, p.r);
     let place = |b: f64| (b, flow.manifold.c(b) * reading(p, b));
-    let speeds = equally_spaced(0.0, FASTEST, POINTS);
+    let speeds = equally_spaced(0.0, FASTEST_PARTICLE, CURVE_POINTS);
     let points = speeds.map(|b| (place(b), theory::impacts_stable(&flow.manifold, b)));
-    let mut panel = Panel::new(((0.0, FASTEST), SPEED), ((0.0, top), amplitude(p)));
+    let mut panel = Panel::new(((0.0, FASTEST_PARTICLE), SPEED), ((0.0, top), amplitude(p)));
     panel.curve(points, 2.0, THEORY, "manifold");
     panel
 }
@@ -328,7 +328,7 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
 /// The decay along the manifold by first-order theory, from an amplitude.
 fn backbone_decay(p: &Dimensionless, from: f64) -> Vec<Triple> {
     let start = theory::backbone_at_level(p, from);
-    let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b, POINTS));
+    let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b, CURVE_POINTS));
     let samples = decay.unwrap_or_default();
     let samples = samples.iter().map(|(tau1, point)| {
         let c = point.c * reading(p, point.b);

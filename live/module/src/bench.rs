@@ -139,8 +139,7 @@ impl Bench {
     /// The message for a drive that the plant refuses.
     pub fn run(&mut self, samples: usize, mut on_row: impl FnMut(&Row)) -> Result<(), Message> {
         for left in (0..samples).rev() {
-            // Only the last sample can be looked into. A plant is large: copies of it would take a third of the time. WebAssembly
-            // copies the output in a call, too.
+            // Only the last sample can be looked into. A plant is large, and WebAssembly copies the output in a call, too.
             on_row(&self.sample(left == 0)?);
         }
         Ok(())
@@ -306,7 +305,7 @@ impl Controller for Requested<'_> {
 
 /// Relaxations of the linear response after which a motion has its regime, and periods after which it is not waited for.
 const RELAXATIONS: f64 = 6.0;
-const LONGEST: f64 = 1000.0;
+const MOST_PERIODS: f64 = 1000.0;
 
 /// The regime under a constant drive of detuning `sigma` and excitation `g`, from the start of the scene.
 ///
@@ -319,7 +318,7 @@ pub fn regime_at(scene: &Scene, sigma: f64, g: f64) -> Result<Regime, Message> {
     let mut plant = Plant::new(scene.plant, scene.start)?;
     let mut impacts = LastImpacts::default();
     // The amplitude relaxes by e in 1/(pi epsilon lambda) periods.
-    let periods = (RELAXATIONS / (PI * d.epsilon * d.lambda)).min(LONGEST) as usize;
+    let periods = (RELAXATIONS / (PI * d.epsilon * d.lambda)).min(MOST_PERIODS) as usize;
     for n in 0..periods {
         let mut count = |event: Event| {
             if let Event::Impact { t, velocity, .. } = event {

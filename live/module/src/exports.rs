@@ -24,7 +24,7 @@ use crate::settings::{COUNT, Settings};
 /// Largest number of values of one call.
 const CAPACITY: usize = 1 << 16;
 /// Columns of a row of the record.
-const COLUMNS: usize = 11;
+const ROW_COLUMNS: usize = 11;
 
 struct Page {
     // Boxed: bytes of zeros for a bench would be a part of the module.
@@ -133,7 +133,7 @@ pub extern "C" fn place(primary: i32, to: f64) -> i32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn run(samples: u32) -> i32 {
     values(|bench, output| {
-        bench.run((samples as usize).min(CAPACITY / COLUMNS), |row| {
+        bench.run((samples as usize).min(CAPACITY / ROW_COLUMNS), |row| {
             let controller = &row.output;
             output.extend([
                 row.time,

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use vines_bench::experiment::run;
-use vines_bench::identification::{WINDOW, decay_points};
+use vines_bench::identification::{DECAY_WINDOW, decay_points};
 use vines_bench::live::HarmonicMotion;
 use vines_bench::record::Record;
 use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
@@ -47,7 +47,7 @@ fn lock_and_free_decay_have_the_bits_of_the_lab_under_a_constant_drive() {
         assert_eq!(live.map(f64::to_bits), lab.map(f64::to_bits), "sample {n}");
     }
     assert!(bench.output.locked);
-    let points = decay_points(&record, &scene.knowledge(), WINDOW).points;
+    let points = decay_points(&record, &scene.knowledge(), DECAY_WINDOW).points;
     assert!(points.len() > 50, "{} points", points.len());
     let released = bench.motion;
     bench.drive(false);

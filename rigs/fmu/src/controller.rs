@@ -9,7 +9,7 @@ use vines_rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, M
 use crate::instance::{Connection, Fmu, FmuError, Use, Variable, connections};
 
 /// What the bench uses beside the parameters and the fields of a move, with SI units.
-const NAMES: [(&str, &str); 13] = [
+const CONTROLLER_VARIABLES: [(&str, &str); 13] = [
     ("response", "m"),
     ("reference", "m"),
     ("active", ""),
@@ -28,7 +28,7 @@ const NAMES: [(&str, &str); 13] = [
 /// All that the bench uses, with SI units.
 fn used() -> Vec<(String, &'static str)> {
     let parameters = PARAMETERS.iter().map(|parameter| (parameter.name, parameter.unit));
-    let named = NAMES.into_iter().chain(parameters);
+    let named = CONTROLLER_VARIABLES.into_iter().chain(parameters);
     let moves = MOVE.map(|(name, unit)| (format!("move.{name}"), unit));
     named.map(|(name, unit)| (name.to_owned(), unit)).chain(moves).collect()
 }

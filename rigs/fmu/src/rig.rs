@@ -13,7 +13,7 @@ use vines_rig::{
 use crate::instance::{Connection, Fmu, FmuError, Use, Variable, connections};
 
 /// What the bench uses beside the parameters, with SI units.
-const NAMES: [(&str, &str); 16] = [
+const RIG_VARIABLES: [(&str, &str); 16] = [
     ("omega", "rad/s"),
     ("E", "m"),
     ("e", "m"),
@@ -33,7 +33,7 @@ const NAMES: [(&str, &str); 16] = [
 ];
 
 /// Variables with a start value in the scene.
-const STARTS: [&str; 4] = ["q1", "der(q1)", "q2", "der(q2)"];
+const START_VARIABLES: [&str; 4] = ["q1", "der(q1)", "q2", "der(q2)"];
 
 /// All that the bench uses, with SI units: of response and base those of the scene's definition where the scene maps them.
 fn used(names: &Names, definition: Definition) -> Vec<(String, &'static str)> {
@@ -51,7 +51,7 @@ fn used(names: &Names, definition: Definition) -> Vec<(String, &'static str)> {
             channel.map_or(unit, |(_, quantity)| quantity.unit_in_ascii()),
         )
     };
-    NAMES.into_iter().chain(parameters).map(unit).collect()
+    RIG_VARIABLES.into_iter().chain(parameters).map(unit).collect()
 }
 
 /// What the bench asks of the FMU of a plant.
@@ -162,7 +162,7 @@ impl FmuRig {
     /// What the bench uses, and what of it the FMU at `path` has.
     pub fn connections(path: &Path, names: &Names, definition: Definition) -> Result<Vec<Connection>, FmuError> {
         let parameters = PLANT_PARAMETERS.iter().map(|row| row.symbol);
-        let starts: Vec<&str> = STARTS.into_iter().chain(parameters).collect();
+        let starts: Vec<&str> = START_VARIABLES.into_iter().chain(parameters).collect();
         connections(path, names, &used(names, definition), &starts)
     }
 }

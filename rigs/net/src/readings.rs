@@ -8,7 +8,7 @@ use crate::frame::Reading;
 use crate::timing::Counters;
 
 /// Largest number of readings that are kept: more than two periods of the finest sampling of a scene.
-const MOST: usize = 1 << 18;
+const MOST_READINGS: usize = 1 << 18;
 
 /// The readings that arrive by their numbers, in order: a lost one is reconstructed. It repeats the reading a period of the drive before it;
 /// for the response plus a straight line that meets the readings on both sides of the gap. Before the end of the first period, or with a
@@ -81,7 +81,7 @@ impl Readings {
     /// Keeps the reading of the present sample.
     fn keep(&mut self, reading: Sensors) {
         let (phase, past) = (self.phase, &mut self.past);
-        if past.back().is_some_and(|(last, _)| *last >= phase) || past.len() >= MOST {
+        if past.back().is_some_and(|(last, _)| *last >= phase) || past.len() >= MOST_READINGS {
             // The drive has no frequency, or its period exceeds what is kept.
             past.clear();
         }

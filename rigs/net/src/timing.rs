@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::frame::{Frame, Kind};
 
 /// Largest lateness that the histogram resolves, ns: a minute. A later sample counts as that late.
-const LONGEST: u64 = 60_000_000_000;
+const LARGEST_LATENESS: u64 = 60_000_000_000;
 /// Significant digits of a lateness in the histogram.
 const DIGITS: u8 = 3;
 /// s per ns.
@@ -36,7 +36,7 @@ pub struct RealTimeClock {
 impl RealTimeClock {
     /// A clock that starts now; `period` in s.
     pub fn start(period: f64) -> Self {
-        let lateness = Histogram::new_with_bounds(1, LONGEST, DIGITS).expect("the bounds are valid");
+        let lateness = Histogram::new_with_bounds(1, LARGEST_LATENESS, DIGITS).expect("the bounds are valid");
         Self {
             start: Instant::now(),
             period,

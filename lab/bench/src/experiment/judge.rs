@@ -13,7 +13,7 @@ use vines_scene::knowledge::Target;
 /// Range of noise, in standard deviations: ten independent normal values exceed it with a probability of 5 % (studentised range).
 const NOISE_RANGE: f64 = 4.5;
 /// Parts of the dwell whose means are compared.
-const PARTS: usize = 4;
+const DWELL_PARTS: usize = 4;
 
 /// Judges a lock by the periods of the drive, as the bench fits them.
 ///
@@ -119,7 +119,7 @@ impl Judge {
 /// per period, `noise`: relative range from period to period that noise explains.
 fn ranges(cycles: &[Cycle], value: fn(&Cycle) -> f64, drift: f64, noise: f64) -> [[f64; 2]; 2] {
     let values: Vec<f64> = cycles.iter().map(value).collect();
-    let length = values.len().div_ceil(PARTS);
+    let length = values.len().div_ceil(DWELL_PARTS);
     let parts: Vec<f64> = values.chunks(length).map(|part| mean(part.iter().copied())).collect();
     let level = mean(values.iter().copied());
     let [found, of_parts] = [&values, &parts].map(|values| {

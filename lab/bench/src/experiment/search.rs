@@ -18,7 +18,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{Estimate, HarmonicBasis, RANDOM, SIGNIFICANT, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, SearchFound, Stage};
-use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST, ResonanceFit, degrees, without_tones};
+use crate::identification::{ASYMMETRIC, Criterion, Cycle, LONGEST_SETTLING, ResonanceFit, degrees, without_tones};
 use crate::rig::{Controller, ControllerError, LoopState, Move, Rig};
 use vines_scene::knowledge::Target;
 use vines_scene::linear::LinearResponse;
@@ -26,11 +26,11 @@ use vines_scene::linear::{Impacts, impacts_by_resonance};
 use vines_scene::plan::Plan;
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.
-const NEAR: f64 = 0.35;
+const CONTROL_PHASE_ERROR: f64 = 0.35;
 /// Largest relative change of the response in a leg: the stable orbits above the fold span a few percent.
-const STEP: f64 = 0.04;
+const LEG_CHANGE: f64 = 0.04;
 /// Largest share of the drive that changes the response.
-const SHARE: f64 = 0.3;
+const STEERING_SHARE: f64 = 0.3;
 /// Duration of a rise of the response by the half-width, periods.
 const RISE: f64 = 60.0;
 /// Largest relative error of the half-width in the drawing.
@@ -41,16 +41,16 @@ const UNREACHED: f64 = 1.5;
 const LOWEST: f64 = 0.05;
 /// Smallest ratio of the response to where the lock was found at which the motion counts as the same; the largest is its inverse. The stable range of
 /// the symmetric motion is wider. It is also the smallest ratio of the setpoint to a response that follows it.
-const LOST: f64 = 0.8;
+const SAME_MOTION: f64 = 0.8;
 /// Smallest slope of the holding drive over the response under a constant drive, over their ratio, which is the slope without impacts: with less,
 /// an error of 1 % of the drive moves the response by more than 10 %, and the motion takes ten times as long to settle.
 const SMALLEST_SLOPE: f64 = 0.1;
 /// Relative error of the response, and error of the frequency over the half-power bandwidth E/A, at which the response that the requested drive
 /// holds has been found.
-const FOUND: f64 = 1e-4;
+const RESPONSE_FOUND: f64 = 1e-4;
 /// Relative error of the drive at which a constant drive takes over where the drive rises faster than in proportion to the response: a quarter of
 /// what a leg changes.
-const CLOSE: f64 = 0.25 * STEP;
+const CLOSE: f64 = 0.25 * LEG_CHANGE;
 /// Share of a straight line that is followed where its bend is not known.
 const CAUTIOUS: f64 = 0.5;
 /// Largest number of levels that are held for it.
@@ -146,7 +146,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             return Ok(None);
         }
         for search in 0..SEARCHES {
-            let step = STEP / f64::from(1 << search);
+            let step = LEG_CHANGE / f64::from(1 << search);
             leg = self.symmetric(leg, step)?;
             if let Some(held) = self.solve(&mut leg, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
@@ -168,7 +168,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Goes to a symmetric motion with impacts, if there is one, and holds its response.
     pub fn impacts(&mut self) -> Result<(), ExperimentError> {
         let leg = self.begin()?;
-        self.symmetric(leg, STEP)?;
+        self.symmetric(leg, LEG_CHANGE)?;
         Ok(())
     }
 
@@ -181,7 +181,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let closed = state.is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
             let is_near = self.bench.cycle(period, self.target).is_some_and(|cycle| {
                 self.setpoint = cycle.amplitude();
-                cycle.phase_error.abs() < NEAR
+                cycle.phase_error.abs() < CONTROL_PHASE_ERROR
             });
             near = if closed && is_near { near + 1 } else { 0 };
         }
@@ -194,7 +194,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         // A drive that does not reach the walls from the middle still moves the structure to a particle that moves.
         let end = (UNREACHED * self.b).min(largest / (self.damping() * (1.0 + DRAWING)));
         let highest = self.b.min(end / (1.0 + DRAWING));
-        let spare = SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * highest);
+        let spare = STEERING_SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * highest);
         let rate = (self.b / (RISE * self.period)).min(spare);
         while !leg.departed || leg.response < (1.0 - DRAWING) * highest {
             if leg.symmetric {
@@ -222,7 +222,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let mut seen = leg.departed;
         while !leg.symmetric
             && (leg.departed || leg.asymmetry > 0.0 || !seen)
-            && self.setpoint > (LOWEST * self.b).max(LOST * leg.last)
+            && self.setpoint > (LOWEST * self.b).max(SAME_MOTION * leg.last)
         {
             leg = self.sweep(&leg, -step * leg.last)?;
             seen |= leg.departed;
@@ -335,7 +335,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             levels
                 .legs
-                .retain(|level| (level.response - leg.response).abs() > FOUND * leg.response);
+                .retain(|level| (level.response - leg.response).abs() > RESPONSE_FOUND * leg.response);
             next = Some(leg.response);
         }
         // The sweep goes on from there.
@@ -347,8 +347,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     fn is_found(&self, leg: &Leg, predicted: &Predicted) -> bool {
         let bandwidth = leg.drive / leg.response;
         let change = predicted.response - leg.response;
-        let is_near = change.abs() < FOUND * leg.response
-            && (predicted.turning * change).abs() < FOUND * bandwidth * self.linear.omega0;
+        let is_near = change.abs() < RESPONSE_FOUND * leg.response
+            && (predicted.turning * change).abs() < RESPONSE_FOUND * bandwidth * self.linear.omega0;
         predicted.is_root && is_near || (self.requested - leg.drive).abs() < leg.noise
     }
 
@@ -392,7 +392,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
-            let is_there = (LOST..1.0 / LOST).contains(&(leg.response / first));
+            let is_there = (SAME_MOTION..1.0 / SAME_MOTION).contains(&(leg.response / first));
             asymmetric = if leg.symmetric && is_there { 0 } else { asymmetric + 1 };
             self.setpoint = leg.last;
         }
@@ -418,7 +418,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             return Ok(false);
         };
         *confirmed = if criterion.is_met(&estimate) { *confirmed + 1 } else { 0 };
-        let is_long = self.cycles.len() >= LONGEST;
+        let is_long = self.cycles.len() >= LONGEST_SETTLING;
         if let Some(why) = estimate.unsteady.filter(|_| is_long && *confirmed == 0) {
             let (periods, response) = (self.cycles.len(), leg.response);
             return Err(ExperimentError::NotSteady { periods, response, why });
@@ -439,7 +439,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// A leg that changes the response by `change`, m, and lets it go on at this rate.
     fn sweep(&mut self, leg: &Leg, change: f64) -> Result<Leg, ExperimentError> {
-        let periods = self.periods(STEP * leg.response, leg);
+        let periods = self.periods(LEG_CHANGE * leg.response, leg);
         self.leg(change, periods, change / (periods as f64 * self.period))
     }
 
@@ -458,7 +458,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Periods for a change of the response, m, so that a share of the holding drive makes it.
     fn periods(&self, change: f64, leg: &Leg) -> usize {
-        let rate = SHARE * self.gain() * leg.drive.max(SMALLEST_SLOPE * self.requested);
+        let rate = STEERING_SHARE * self.gain() * leg.drive.max(SMALLEST_SLOPE * self.requested);
         FOLLOWED.max((change.abs() / (rate * self.period)).ceil() as usize)
     }
 
@@ -668,7 +668,9 @@ impl Levels {
 
     /// Whether no level has been held here, m.
     fn is_new(&self, to: f64) -> bool {
-        self.legs.iter().all(|level| (level.response - to).abs() > FOUND * to)
+        self.legs
+            .iter()
+            .all(|level| (level.response - to).abs() > RESPONSE_FOUND * to)
     }
 
     /// The prediction by the parabola through three levels: two between which the drive passes the requested one, rising with the response
@@ -739,7 +741,7 @@ impl Levels {
         let [lowest, .., highest] = &self.legs[..] else {
             return None;
         };
-        let span = (STEP * highest.response).max(highest.response - lowest.response);
+        let span = (LEG_CHANGE * highest.response).max(highest.response - lowest.response);
         let is_near = (lowest.response - span..highest.response + span).contains(&response);
         is_near.then(|| Predicted {
             response,

@@ -55,7 +55,7 @@ const TIMES: [&str; 4] = ["time", "t", "timestamp", "x_value"];
 /// Residual of the clock over a step below which the samples count as even: then interpolation changes nothing that noise does not hide.
 const EVEN: f64 = 1e-3;
 /// A step over the 99th percentile of all steps from which samples are missing.
-const GAP: f64 = 1.5;
+const MISSING_STEP: f64 = 1.5;
 
 /// Even times that fit those of a channel.
 struct Clock {
@@ -387,7 +387,7 @@ impl File<'_> {
         let mut sorted: Vec<f64> = steps().collect();
         sorted.sort_by(f64::total_cmp);
         let usual = sorted[(sorted.len() - 1) * 99 / 100].max(step);
-        let is_broken = |one: f64| one > GAP * usual || one < -0.5 * step;
+        let is_broken = |one: f64| one > MISSING_STEP * usual || one < -0.5 * step;
         let broken = steps().position(is_broken);
         let is_uneven = broken.is_some() || sorted[0] < 0.5 * step;
         let rounded = if is_uneven { rounded(times, step) } else { None };
@@ -469,7 +469,10 @@ impl File<'_> {
         if resolution * resolution < EVEN * duration * (duration / count as f64) {
             return Ok(None);
         }
-        if let Some(n) = jumps.iter().find(|n| !(0.0..GAP * resolution).contains(&steps[**n])) {
+        if let Some(n) = jumps
+            .iter()
+            .find(|n| !(0.0..MISSING_STEP * resolution).contains(&steps[**n]))
+        {
             return Err(RecordingError::new(format!(
                 "{}, {}: the time goes from {} s to {} s, where a step is {resolution:.6} s: the recording is interrupted there. Fit the parts as files \
                  of their own",

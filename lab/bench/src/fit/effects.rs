@@ -19,9 +19,9 @@ use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, mean};
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
 use super::{
-    FEWEST, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem, Quantity,
-    REJECTED, RecordFit, Recording, RecordingError, UNKNOWNS, Unknowns, across, at, checked, fit, follow, gradient,
-    linear_verdicts, parts, plant, shifted,
+    FEWEST_POINTS, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem,
+    Quantity, REJECTED, RecordFit, Recording, RecordingError, UNKNOWNS, Unknowns, across, at, checked, fit, follow,
+    gradient, linear_verdicts, parts, plant, shifted,
 };
 use vines_scene::linear::MeasuredLinear;
 use vines_scene::scene::{Parameters, Scene};
@@ -56,22 +56,22 @@ pub struct Candidate {
 }
 
 /// Most steps of a fit, and of a motion along the curve to a point.
-const ROUNDS: usize = 30;
+const MOST_FIT_STEPS: usize = 30;
 /// Longest step along the curve, in units of its tangent.
-const FARTHEST: f64 = 0.1;
+const LONGEST_CURVE_STEP: f64 = 0.1;
 /// Difference of the response over b at which a motion is at a point.
-const NEAR: f64 = 1e-3;
+const POINT_DISTANCE: f64 = 1e-3;
 /// What a further step would take from chi-square, relative to one and chi-square, at which the minimum counts as found.
-const FOUND: f64 = 1e-4;
+const EFFECT_GAIN: f64 = 1e-4;
 /// Smallest strength, over that from which the search begins.
-const SMALLEST: f64 = 1e-3;
+const SMALLEST_STRENGTH: f64 = 1e-3;
 /// Strengths from which a search begins, a typical, a weak and a strong one, the largest of a rig that is built with care, over that which gives the particle the acceleration `b omega0²`, or the
 /// suspension the additional stiffness `m omega0²`: a typical friction and tilt are about 0.03 and 2 degrees on the default rig.
 const STRENGTHS: [f64; 3] = [0.01, 0.001, 0.05];
 /// Smallest step to the largest strength that points allow, as a factor.
-const FINEST: f64 = 1.1;
+const SMALLEST_FACTOR: f64 = 1.1;
 /// Step of a difference: of the unknowns, of the strength relative, and along the curve.
-const STEP: f64 = 1e-4;
+const EFFECT_DIFFERENCE: f64 = 1e-4;
 impl Effect {
     /// All of them.
     pub const ALL: [Self; 5] = [
@@ -356,7 +356,7 @@ pub fn find(measured: &Measurements, scene: &Scene, mut progress: impl FnMut(usi
         found.fit.residuals = beside.residuals;
         found.fit.left_out.clear();
     }
-    if points.len() < FEWEST {
+    if points.len() < FEWEST_POINTS {
         return Ok(found);
     }
     let is_rejected = found.fit.is_rejected();
@@ -444,17 +444,17 @@ impl Problem<'_> {
         let (mut before, mut factor) = (ideal.x, 2.0_f64);
         before[6] = 0.0;
         let strong = effect.start(&ideal.x, STRENGTHS[2])[6];
-        for _ in 0..ROUNDS {
+        for _ in 0..MOST_FIT_STEPS {
             // On the straight line through the last two.
             let here = best.fit.x;
             let left = strong / here[6].abs();
-            if left < FINEST {
+            if left < SMALLEST_FACTOR {
                 break;
             }
             let further = (factor.min(left) - 1.0) * here[6] / (here[6] - before[6]);
             match held(here + (here - before) * further) {
                 Some(next) => (before, best) = (here, next),
-                None if factor < FINEST => break,
+                None if factor < SMALLEST_FACTOR => break,
                 None => factor = factor.sqrt(),
             }
         }
@@ -499,8 +499,13 @@ impl Problem<'_> {
         let fit = if effect == Effect::Hardening {
             problem.fit_from([x].into_iter()).ok()?
         } else {
-            let curve = PlantCurve { problem: &problem, effect, speed, smallest: SMALLEST * x[6] };
-            let minimum = LeastSquares::minimum(&curve, x, &curve.along(&x)?, FOUND)?;
+            let curve = PlantCurve {
+                problem: &problem,
+                effect,
+                speed,
+                smallest: SMALLEST_STRENGTH * x[6],
+            };
+            let minimum = LeastSquares::minimum(&curve, x, &curve.along(&x)?, EFFECT_GAIN)?;
             let places: Vec<Nearest> = minimum
                 .trace
                 .iter()
@@ -571,7 +576,7 @@ impl PlantCurve<'_> {
     /// As [`PlantCurve::motion`], for a point.
     fn place(&self, x: &Unknowns, n: usize, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<Place> {
         let motion = self.motion(x, n, near, tangent, ahead)?;
-        let next = self.motion(x, n, &motion, tangent, STEP)?;
+        let next = self.motion(x, n, &motion, tangent, EFFECT_DIFFERENCE)?;
         let [length, rate] = units(x);
         let change = [
             (next.response.norm() - motion.response.norm()) / length,
@@ -597,16 +602,16 @@ impl PlantCurve<'_> {
         let (mut tangent, mut places) = ([1.0, 0.0], Vec::new());
         for n in order {
             let mut place = self.place(x, n, &near, tangent, 0.0)?;
-            for _ in 0..ROUNDS {
+            for _ in 0..MOST_FIT_STEPS {
                 let rest = (points[n].response.value - place.motion.response.norm()) / units(x)[0];
                 // Beyond the fold the amplitude rises again.
-                if rest.abs() < NEAR || place.tangent[0] < 0.0 {
+                if rest.abs() < POINT_DISTANCE || place.tangent[0] < 0.0 {
                     break;
                 }
-                let ahead = (rest / place.tangent[0]).clamp(-FARTHEST, FARTHEST);
+                let ahead = (rest / place.tangent[0]).clamp(-LONGEST_CURVE_STEP, LONGEST_CURVE_STEP);
                 // Where the curve bends, a long step along its tangent finds no motion.
-                let steps = (0..ROUNDS).map(|n| ahead * 0.5_f64.powi(n as i32));
-                let mut steps = steps.take_while(|step| step.abs() >= NEAR.min(ahead.abs()));
+                let steps = (0..MOST_FIT_STEPS).map(|n| ahead * 0.5_f64.powi(n as i32));
+                let mut steps = steps.take_while(|step| step.abs() >= POINT_DISTANCE.min(ahead.abs()));
                 place = steps.find_map(|step| self.place(x, n, &place.motion, place.tangent, step))?;
             }
             (near, tangent) = (place.motion.clone(), place.tangent);
@@ -625,10 +630,16 @@ impl Misfit<UNKNOWNS> for PlantCurve<'_> {
         let moved = near.iter().enumerate().map(|(n, place)| {
             let here = self.place(x, n, &place.motion, place.tangent, 0.0)?;
             let ahead = -here.along.dot(&here.residual) / here.along.norm_squared();
-            if ahead.abs() < NEAR {
+            if ahead.abs() < POINT_DISTANCE {
                 return Some(here);
             }
-            self.place(x, n, &here.motion, here.tangent, ahead.clamp(-FARTHEST, FARTHEST))
+            self.place(
+                x,
+                n,
+                &here.motion,
+                here.tangent,
+                ahead.clamp(-LONGEST_CURVE_STEP, LONGEST_CURVE_STEP),
+            )
         });
         let places: Vec<Place> = moved.collect::<Option<_>>()?;
         let residuals = places
@@ -639,7 +650,11 @@ impl Misfit<UNKNOWNS> for PlantCurve<'_> {
 
     fn derivatives(&self, x: &Unknowns, at: &Vec<Place>) -> Option<Vec<Unknowns>> {
         self.problem.rows(x, at.iter().map(|place| place.along), |n, i| {
-            let step = if i == 6 { STEP * x[6] } else { STEP };
+            let step = if i == 6 {
+                EFFECT_DIFFERENCE * x[6]
+            } else {
+                EFFECT_DIFFERENCE
+            };
             let slope = |step: f64| {
                 let motion = self.motion(&shifted(x, i, step), n, &at[n].motion, at[n].tangent, 0.0)?;
                 Some((self.residual(n, &motion) - at[n].residual) / step)

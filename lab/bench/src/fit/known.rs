@@ -116,7 +116,7 @@ pub enum Known {
 }
 
 /// Relative uncertainty of a value that is known exactly: above rounding.
-const EXACT: f64 = 1e-9;
+const EXACT_VALUE: f64 = 1e-9;
 
 impl Known {
     /// Whether it needs a mass.
@@ -136,7 +136,7 @@ impl Known {
     pub(super) fn residuals(&self, x: &Unknowns) -> Vec<f64> {
         match self {
             Self::Value { quantity, estimate: Estimate { value, uncertainty } } => {
-                let uncertainty = uncertainty.max(EXACT * value.abs()).max(f64::MIN_POSITIVE);
+                let uncertainty = uncertainty.max(EXACT_VALUE * value.abs()).max(f64::MIN_POSITIVE);
                 vec![(quantity.of(x) - value) / uncertainty]
             }
             Self::Linear(linear) => {

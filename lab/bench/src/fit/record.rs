@@ -61,23 +61,23 @@ struct Cut {
 /// Periods of a piece: innovations are tested piece by piece.
 const PIECE: usize = 16;
 /// Periods by which stretches extend beyond the parts that have points: the tests of pieces say what belongs.
-const GAP: usize = 16;
+const STRETCH_MARGIN: usize = 16;
 /// Most rounds of fits and tests.
-const ROUNDS: usize = 30;
+const MOST_ROUNDS: usize = 30;
 /// Prior standard deviations of both masses at the start of a stretch, over the response.
 const PRIOR: [f64; 2] = [0.02, 0.1];
 /// Error of the prediction, over the response, at which the plant has lost the motion.
-const LOST: f64 = 0.5;
-/// Step of a difference, relative. A record without noise determines its best direction to 5e-8; with a step of 1e-5 the search of one ended early.
-const STEP: f64 = 1e-7;
+const MOTION_LOST: f64 = 0.5;
+/// Step of a difference, relative. A record without noise determines its best direction to 5e-8.
+const RECORD_DIFFERENCE: f64 = 1e-7;
 /// Step of a state, over the response: so small that hardly any impact lies between both states.
-const BESIDE: f64 = 1e-7;
+const STATE_DIFFERENCE: f64 = 1e-7;
 /// Noise of the process, over the noise of the measurement, in the first fit, in which the plant stays near the record whatever the parameters.
 const STRONG: f64 = 0.2;
 /// Gain of a further step, relative to one and chi-square, at which the minimum counts as found.
-const FOUND: f64 = 1e-5;
+const RECORD_GAIN: f64 = 1e-5;
 /// Probability of a piece that belongs to the motion to be left out, for all pieces together.
-const FALSE_ALARM: f64 = 1e-3;
+const PIECE_FALSE_ALARM: f64 = 1e-3;
 /// Standard uncertainties of what is expected of f0, zeta, b and epsilon, relative, and of r, where the search begins.
 const EXPECTED: [f64; 5] = [0.01, 0.3, 0.2, 0.2, 0.3];
 /// Share of the jumps that the base makes: all where a simulation changes its amplitude at each sample, none of a smooth base.
@@ -89,9 +89,9 @@ const ROUGH: f64 = 0.1;
 /// Weight that holds a function of the unknowns, over its standard uncertainty.
 const HOLD: f64 = 1e3;
 /// Half-width of a cavity that no response fills, over the expected one.
-const WIDE: f64 = 1e3;
+const WIDE_CAVITY: f64 = 1e3;
 /// Rounding of sums of squares, relative.
-const ROUNDING: f64 = 1e-9;
+const SUM_ROUNDING: f64 = 1e-9;
 /// Rise of chi-square at the end of an interval of three standard uncertainties.
 const END: f64 = 9.0;
 
@@ -555,17 +555,17 @@ impl Followed<'_> {
         let there = harmonic(&record.recording.response[begin..end]);
         let (amplitude, turn) = (there.norm(), there.conj() / there.norm());
         let innovation = one.innovation(begin, &readings, turn);
-        if innovation.norm() > LOST * amplitude {
+        if innovation.norm() > MOTION_LOST * amplitude {
             return None;
         }
         let (mut transition, mut reading) = (Matrix4::zeros(), Matrix2x4::zeros());
         for i in 0..4 {
             let mut beside = from.clone();
-            beside.moved(&Vector4::ith(i, BESIDE * amplitude))?;
+            beside.moved(&Vector4::ith(i, STATE_DIFFERENCE * amplitude))?;
             let others = beside.to(end)?;
-            transition.set_column(i, &((beside.state() - state) / (BESIDE * amplitude)));
+            transition.set_column(i, &((beside.state() - state) / (STATE_DIFFERENCE * amplitude)));
             let change = innovation - beside.innovation(begin, &others, turn);
-            reading.set_column(i, &(change / (BESIDE * amplitude)));
+            reading.set_column(i, &(change / (STATE_DIFFERENCE * amplitude)));
         }
         let noise = record.response_noise[record.piece(begin)];
         let process = PI * PI * record.base_variance(begin, end) + self.least_noise * self.least_noise * noise.trace();
@@ -680,7 +680,7 @@ impl Followed<'_> {
                 .iter()
                 .map(|one| one.counted().chunks(PIECE).len())
                 .sum::<usize>();
-            let limit = -2.0 * (FALSE_ALARM / pieces.max(1) as f64).ln();
+            let limit = -2.0 * (PIECE_FALSE_ALARM / pieces.max(1) as f64).ln();
             let colours: Vec<f64> = (0..self.records.len()).map(|record| self.colour(record)).collect();
             let contradicts = |piece: &[Step], colour: f64| {
                 let moved = piece
@@ -788,7 +788,7 @@ impl Followed<'_> {
     fn rough(&self, x: &Unknowns) -> Vec<Vec<Option<bool>>> {
         let unknowns = (0..UNKNOWNS).filter(|i| *i != 5);
         let beside: Vec<_> = unknowns
-            .map(|i| [STEP, -STEP].map(|step| self.each(&shifted(x, i, step))))
+            .map(|i| [RECORD_DIFFERENCE, -RECORD_DIFFERENCE].map(|step| self.each(&shifted(x, i, step))))
             .collect();
         let flags = |(stretch, here): (usize, &Vec<Vector2<f64>>)| {
             let pieces = here.chunks(PIECE).enumerate().map(|(n, piece)| {
@@ -818,7 +818,7 @@ impl Followed<'_> {
         let step = normal.cholesky().map_or(Unknowns::zeros(), |one| one.solve(&gradient));
         // What chi-square falls by: the innovations, and what all others gain by the step of the parameters to their own minimum.
         let fall = |rows: std::ops::Range<usize>| -> f64 {
-            let (mut rest, mut pull, mut own) = (normal * (1.0 + ROUNDING), Unknowns::zeros(), 0.0);
+            let (mut rest, mut pull, mut own) = (normal * (1.0 + SUM_ROUNDING), Unknowns::zeros(), 0.0);
             for (residual, row) in minimum.residuals[rows.clone()].iter().zip(&minimum.derivatives[rows]) {
                 let residual = residual - row.dot(&step);
                 rest.ger(-1.0, row, row, 1.0);
@@ -835,7 +835,7 @@ impl Followed<'_> {
         };
         let falls: Vec<Vec<f64>> = counts.iter().map(pieces).collect();
         let most = falls.iter().flatten().copied().fold(0.0, f64::max);
-        let p = FALSE_ALARM / falls.concat().len().max(1) as f64;
+        let p = PIECE_FALSE_ALARM / falls.concat().len().max(1) as f64;
         let limit = ChiSquared::new(2.0 * PIECE as f64).map_or(f64::INFINITY, |one| one.inverse_cdf(1.0 - p));
         let flag = |fall: &f64| (*fall > limit.max(0.5 * most)).then_some(true);
         let flags = |one: &Vec<f64>| one.iter().map(flag).collect();
@@ -861,12 +861,12 @@ impl Misfit<UNKNOWNS> for Followed<'_> {
             if i == 5 {
                 Some(here.clone())
             } else {
-                self.all(&shifted(x, i, STEP))
+                self.all(&shifted(x, i, RECORD_DIFFERENCE))
             }
         };
         let columns: Option<Vec<Vec<f64>>> = (0..UNKNOWNS).map(column).collect();
         let columns = columns?;
-        let row = |n: usize| Unknowns::from_fn(|i, _| (columns[i][n] - here[n]) / STEP);
+        let row = |n: usize| Unknowns::from_fn(|i, _| (columns[i][n] - here[n]) / RECORD_DIFFERENCE);
         rows.push(Unknowns::ith(6, 1.0 / JUMP.uncertainty));
         rows.extend(self.held.map(|(function, _)| HOLD * function));
         rows.extend((0..here.len()).map(row));
@@ -884,12 +884,12 @@ impl Followed<'_> {
     /// The minimum that is reached from these parameters, and what is left out; `None` where too little belongs, or too much contradicts it.
     fn search(&mut self, mut x: Unknowns) -> Option<(Minimum, Vec<Cut>)> {
         let mut out = self.linearise(&x);
-        for _ in 0..ROUNDS {
+        for _ in 0..MOST_ROUNDS {
             out.extend(self.linearise(&x));
             if self.impacts == 0 && !out.is_empty() {
                 return None;
             }
-            let minimum = Minimum::minimum(self, x, &Vec::new(), FOUND)?;
+            let minimum = Minimum::minimum(self, x, &Vec::new(), RECORD_GAIN)?;
             if self.impacts == 0 && Self::contradicts(&minimum) {
                 return None;
             }
@@ -1011,7 +1011,7 @@ impl Followed<'_> {
             let (mut step, mut moved) = (side, deviation * side);
             loop {
                 self.held = Some((function, function.dot(&minimum.x) + step));
-                let Some(found) = Minimum::minimum(self, minimum.x + moved, &minimum.trace, FOUND) else {
+                let Some(found) = Minimum::minimum(self, minimum.x + moved, &minimum.trace, RECORD_GAIN) else {
                     break;
                 };
                 moved = found.x - minimum.x;
@@ -1046,7 +1046,7 @@ impl Followed<'_> {
     /// is. A free particle and one that is carried along differ in frequency and damping only.
     fn needs_impacts(&self, expected: &Parameters) -> bool {
         // The particle rests in the middle of a cavity that no response fills.
-        let wide = Parameters { half_width: WIDE * expected.half_width, ..*expected };
+        let wide = Parameters { half_width: WIDE_CAVITY * expected.half_width, ..*expected };
         let (known, x) = (expectations(&wide), start_at(&wide));
         let problem = Problem {
             free: true,
@@ -1064,17 +1064,17 @@ impl Followed<'_> {
         linear.search(x).is_none()
     }
 
-    /// Whether the innovations are too large for what is followed, at the probability [`FALSE_ALARM`].
+    /// Whether the innovations are too large for what is followed, at the probability [`PIECE_FALSE_ALARM`].
     fn contradicts(minimum: &Minimum) -> bool {
         let degrees = minimum.residuals.len() as f64 - 2.0;
-        probability(minimum.chi_square, degrees).is_none_or(|p| p < FALSE_ALARM)
+        probability(minimum.chi_square, degrees).is_none_or(|p| p < PIECE_FALSE_ALARM)
     }
 }
 
 /// Neighbouring parts of a record that may be 1:1, as stretches, with what is near them.
 fn stretches_of(record: usize, parts: &[Part], measured: &Measured) -> Vec<Stretch> {
     let mut spans: Vec<[usize; 2]> = Vec::new();
-    let gap = GAP * measured.period;
+    let gap = STRETCH_MARGIN * measured.period;
     for part in parts
         .iter()
         .filter(|part| part.candidate.is_some() || part.kind == Kind::Decay)
@@ -1190,7 +1190,7 @@ pub fn follow(
         .flat_map(|one| one.residuals(&minimum.x))
         .map(|one| one * one)
         .sum();
-    let is_strange = probability(strange, 5.0).is_none_or(|p| p < FALSE_ALARM);
+    let is_strange = probability(strange, 5.0).is_none_or(|p| p < PIECE_FALSE_ALARM);
     if !is_shown && is_strange || !followed.needs_impacts(expected) {
         return None;
     }

@@ -1,6 +1,6 @@
 //! Points of phase resonance from a recording: two channels, the response and the base, of any run near resonance.
 //!
-//! 1. The base is the clock. Where it moves, its amplitude and phase over [`WINDOW`] periods, interpolated, stand for the command that a bench
+//! 1. The base is the clock. Where it moves, its amplitude and phase over [`CLOCK_WINDOW`] periods, interpolated, stand for the command that a bench
 //!    would know; where it rests, the rig decays.
 //! 2. The periods of a driven part are cut into windows of about the same amplitude, near phase resonance: long where the response is held,
 //!    short where it is swept.
@@ -115,11 +115,11 @@ impl RecordingError {
 }
 
 /// Periods of the fits that make the clock, and of those of a decay.
-const WINDOW: f64 = 2.5;
+const CLOCK_WINDOW: f64 = 2.5;
 /// Periods within which a constant hardly drifts.
 const SLOW: usize = 16;
 /// Fewest periods of a recording.
-const FEWEST: f64 = 16.0;
+const FEWEST_PERIODS: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
 /// Fewest periods of a window: the fit needs four, and so do its halves, which are compared.
@@ -138,12 +138,12 @@ const RESTS: f64 = 0.02;
 const SEEN: f64 = 8.0;
 /// Share of the samples at the same extreme value from which a channel is clipped: a sine that is sampled 100 times a period and rounded to 10
 /// bits has 4 %.
-const CLIPPED: f64 = 0.06;
+const CLIPPED_SHARE: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
-const FARTHEST: f64 = 0.2;
+const NEAR_RESONANCE: f64 = 0.2;
 /// Largest ratio of the damping in the two halves of a linear decay, and in a piece and the whole, and of its inverse: impacts in 1:1 motion double
 /// the loss near the fold.
-const STEADY: f64 = 1.5;
+const DAMPING_RATIO: f64 = 1.5;
 /// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
 const DAMPING: f64 = 0.1;
 
@@ -261,7 +261,8 @@ impl Recording {
             )));
         }
         let (first, second) = decaying.split_at(decaying.len() / 2);
-        let is_steady = |[one, other]: [Estimate; 2]| (1.0 / STEADY..STEADY).contains(&(one.value / other.value));
+        let is_steady =
+            |[one, other]: [Estimate; 2]| (1.0 / DAMPING_RATIO..DAMPING_RATIO).contains(&(one.value / other.value));
         // Held levels whose base is not recorded fall as slowly in both halves, but in steps.
         let is_step = |one: Estimate| !is_steady([one, all]) && (one.value - all.value).abs() > SEEN * one.uncertainty;
         let has_steps = decaying.chunks_exact(2 * LEAST).any(|piece| is_step(rate(piece)));
@@ -302,9 +303,9 @@ impl Recording {
             ));
         }
         let (seconds, periods) = (count as f64 * sample_time, count as f64 * sample_time * hertz);
-        if periods < FEWEST {
+        if periods < FEWEST_PERIODS {
             return refused(format!(
-                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST} are needed"
+                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST_PERIODS} are needed"
             ));
         }
         for ((values, channel), measurand) in both.into_iter().zip(channels).zip(self.measurands) {
@@ -317,7 +318,7 @@ impl Recording {
             }
             for value in [low, high] {
                 let share = values.iter().filter(|sample| **sample == value).count() as f64 / count as f64;
-                if share > CLIPPED && value != 0.0 {
+                if share > CLIPPED_SHARE && value != 0.0 {
                     return refused(format!(
                         ", channel {channel} is clipped: {:.1} % of its samples are equal to its largest or smallest value, {value:e} {}; reduce the \
                          gain, and record again",
@@ -334,7 +335,7 @@ impl Recording {
     fn anchors(&self, knowledge: &Knowledge) -> Vec<Anchor> {
         let (dt, linear) = (self.sample_time, &knowledge.linear);
         let period = TAU / linear.omega0 / dt;
-        let window = (WINDOW * period).round() as usize + 1;
+        let window = (CLOCK_WINDOW * period).round() as usize + 1;
         let step = (period.round() as usize).max(1);
         let mut omega = linear.omega0;
         let mut anchors: Vec<Anchor> = (0..(self.response.len() + 1).saturating_sub(window))
@@ -344,7 +345,7 @@ impl Recording {
                     let found = harmonic(&values[from..from + window], dt, omega);
                     found.filter(|harmonic| {
                         harmonic.amplitude > SEEN * harmonic.uncertainties[0]
-                            && (harmonic.omega / omega - 1.0).abs() < FARTHEST
+                            && (harmonic.omega / omega - 1.0).abs() < NEAR_RESONANCE
                     })
                 };
                 let response = fit(&self.response, omega).or_else(|| fit(&self.response, linear.omega0));
@@ -419,7 +420,7 @@ impl Recording {
         let linear = &knowledge.linear;
         let Self { origin, channels: [response, _], .. } = self;
         let (hertz, strongest, rate) = (linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
-        if (strongest / hertz - 1.0).abs() > FARTHEST {
+        if (strongest / hertz - 1.0).abs() > NEAR_RESONANCE {
             return RecordingError(format!(
                 "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
                  If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
@@ -541,7 +542,7 @@ fn omega(fits: &[(f64, &Harmonic)]) -> Estimate {
 
 /// Standard uncertainty of a fit with this sum of weights: the fits of neighbouring periods overlap, and their scatter may exceed the noise.
 fn uncertainty(misfit: f64, weights: f64, count: usize) -> f64 {
-    (WINDOW.ceil() * (misfit / count as f64).max(1.0) / weights).sqrt()
+    (CLOCK_WINDOW.ceil() * (misfit / count as f64).max(1.0) / weights).sqrt()
 }
 
 /// Both channels at one time. The base rests, or the response cannot be seen, where there is no oscillation.
@@ -702,7 +703,7 @@ fn slopes(here: Held, neighbour: Held) -> [f64; 2] {
 
 /// The points of a decay, with `E = -A'/g`. The fits do not overlap.
 fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<Part> {
-    let apart = WINDOW.ceil() as usize;
+    let apart = CLOCK_WINDOW.ceil() as usize;
     let fits: Vec<(f64, Harmonic)> = anchors
         .iter()
         .step_by(apart)
@@ -720,7 +721,7 @@ fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<P
     let has_impacts = |harmonic: &Harmonic| taken(harmonic) > 0.5 * f64::max(at_first, damping * harmonic.amplitude);
     let synchronous: Vec<_> = fits.iter().take_while(|(_, harmonic)| has_impacts(harmonic)).collect();
     let count = synchronous.len() as f64;
-    let half = 0.5 * WINDOW * TAU / linear.omega0;
+    let half = 0.5 * CLOCK_WINDOW * TAU / linear.omega0;
     // The rest of the decay: the loss that the scene states may hide the impacts there.
     let rest = &fits[synchronous.len().saturating_sub(1)..];
     let rest = rest.first().zip(rest.last()).map(|((from, _), (to, _))| Part {

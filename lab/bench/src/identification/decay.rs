@@ -78,19 +78,18 @@ pub struct DecayPoints {
 }
 
 /// Window of the fit along the decay, periods of the motion: shorter ones have more noise, longer ones blur the end (studies/decay.rs).
-pub const WINDOW: f64 = 2.5;
-/// Length of a window with Hann's weights over one without: three periods. With 1.38 the frequency would be averaged over as long a time: its average
-/// has the second moment L²/20 in a window of the length L, and 0.026 L² with Hann's weights. Of 1.0 to 2.0, 1.2 brings the presets of shakers
-/// nearest to the demodulated driven mode (studies/decay.rs).
+pub const DECAY_WINDOW: f64 = 2.5;
+/// Length of a window with Hann's weights over one without: three periods. It averages the frequency over less time than one without weights, whose
+/// average has the second moment L²/20, and 0.026 L² with Hann's weights: as long a time would take 1.38 (validation/shaker_decay.csv).
 const HANN: f64 = 1.2;
 /// Points per period along the decay.
 pub(crate) const PER_PERIOD: f64 = 8.0;
 /// Smallest loss of amplitude by the impacts of a 1:1 motion, over the loss at the release: with the speed of the particle, it changes by a third
 /// down to the fold.
-const KEPT: f64 = 0.5;
+const LEAST_IMPACT_LOSS: f64 = 0.5;
 
 /// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to
-/// the end of the impacts. `window`: length of each fit, periods of the motion, [`WINDOW`] by default; behind a shaker 1.2 times that.
+/// the end of the impacts. `window`: length of each fit, periods of the motion, [`DECAY_WINDOW`] by default; behind a shaker 1.2 times that.
 pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> DecayPoints {
     let d = knowledge.numbers;
     let none = |end| DecayPoints { points: Vec::new(), end };
@@ -115,7 +114,7 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     // part of the fundamental.
     let (terms, window, lobe) = match knowledge.shaker {
         Some(_) => (BEHIND_SHAKER, HANN * window, 3.0),
-        None => (TERMS, window, 2.0),
+        None => (DECAY_TERMS, window, 2.0),
     };
     if knowledge.nearest_pole * window / omega < lobe {
         return none(DecayEnd::OtherMode);
@@ -131,7 +130,7 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
     let at_release = mean(windows.iter().take(PER_PERIOD as usize).map(taken));
     // A rig that loses no more than its linear damping has no impacts that could end.
     let may_end = !has_impacts && at_release > 0.0;
-    let is_linear = |window: &SlidingFit| may_end && taken(window) < KEPT * at_release;
+    let is_linear = |window: &SlidingFit| may_end && taken(window) < LEAST_IMPACT_LOSS * at_release;
     let end = if windows.iter().any(is_linear) {
         DecayEnd::Linear
     } else if has_impacts && until + 2.0 * half_period < last.time {
@@ -156,7 +155,7 @@ fn last_driven(record: &Record) -> Option<f64> {
 }
 
 /// Rounding of a fit over the largest reading: the least noise.
-const ROUNDING: f64 = 1e-14;
+const LEAST_NOISE: f64 = 1e-14;
 
 /// Index of the sample of the decay from which on the rig is free: the base rests as well as the command.
 ///
@@ -185,7 +184,7 @@ pub(crate) fn base_at_rest(record: &Record, knowledge: &Knowledge) -> Result<usi
             break;
         };
         let variance = basis.residual(&values, &fit).norm_squared() / (period - basis.terms()) as f64;
-        let variance = variance.max((ROUNDING * values.amax()).powi(2)) * target.colour_of_fundamental(omega, dt, 1);
+        let variance = variance.max((LEAST_NOISE * values.amax()).powi(2)) * target.colour_of_fundamental(omega, dt, 1);
         let uncertainty = displacement * (2.0 * variance / period as f64).sqrt();
         let value = displacement * fit.harmonic(1).norm();
         if value <= SIGNIFICANT * uncertainty {
@@ -297,7 +296,7 @@ struct Terms {
 }
 
 /// A constant, and harmonics 1 and 3 with drift.
-const TERMS: Terms = Terms {
+const DECAY_TERMS: Terms = Terms {
     trend: 0,
     harmonics: &[Some(2), None, Some(1)],
     is_hann: false,
@@ -311,7 +310,7 @@ const BEHIND_SHAKER: Terms = Terms {
 };
 
 /// Number of fits, each about the frequency that the fit before found; each reduces the error by orders of magnitude.
-const ROUNDS: usize = 6;
+const FREQUENCY_FITS: usize = 6;
 
 /// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
 /// with linear drift, and a constant.
@@ -319,7 +318,7 @@ const ROUNDS: usize = 6;
 /// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
 /// short or contains no motion of about that frequency.
 pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
-    harmonic_of(values, sample_time, omega, TERMS)
+    harmonic_of(values, sample_time, omega, DECAY_TERMS)
 }
 
 fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Option<Harmonic> {
@@ -339,7 +338,7 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
     // Half a window, s.
     let half = middle * sample_time;
     let (mut omega, mut last) = (omega, None);
-    for _ in 0..ROUNDS {
+    for _ in 0..FREQUENCY_FITS {
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();

@@ -73,8 +73,7 @@ impl Display for Unsteady {
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 near the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const LARGEST_PHASE_ERROR: f64 = 0.02;
-/// Delay of the impacts behind a change of the amplitude, periods: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
-/// (studies/tracking.rs).
+/// Largest delay of the impacts behind a change of the amplitude, periods (studies/tracking.rs).
 pub(crate) const LAG: f64 = 1.6;
 /// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
 const EXCESS: f64 = 2.0;
@@ -82,7 +81,7 @@ const EXCESS: f64 = 2.0;
 /// level.
 const SLOPE: f64 = 0.5;
 /// Periods after which a level is taken, settled or not.
-pub(crate) const LONGEST: usize = 150;
+pub(crate) const LONGEST_SETTLING: usize = 150;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 

@@ -65,7 +65,7 @@ pub struct ResonanceFit {
 const PARABOLA: f64 = 1.2;
 /// Prior standard deviation of an unknown slope, in units of its natural scale: `E/A`, and `g E/A²`. Vibro-impact rigs have slopes from -1 to 3
 /// of these units.
-const WIDE: f64 = 3.0;
+const SLOPE_PRIOR: f64 = 3.0;
 
 impl ResonanceFit {
     /// Fewest periods: one more than the coefficients.
@@ -126,7 +126,7 @@ impl ResonanceFit {
             });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let scale = [base / response, gain * base / (response * response)];
-        let unknown = || scale.map(|scale| Estimate { value: 0.0, uncertainty: WIDE * scale });
+        let unknown = || scale.map(|scale| Estimate { value: 0.0, uncertainty: SLOPE_PRIOR * scale });
         let [by_base, by_omega] = slopes.unwrap_or_else(unknown);
         let drive = Regression::fit(&columns, &amplitudes, Some((2, by_base.scaled(-gain))), noise / cosine)?;
         let turning = Regression::fit(&columns, &phases, Some((2, by_omega)), noise / (response * cosine))?;

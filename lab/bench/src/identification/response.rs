@@ -21,25 +21,25 @@ use vines_scene::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
 use vines_scene::scene::{Definition, Dimensionless, Measurand, Sensor};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
-const STEADY: f64 = 3e-3;
+const STEADY_RESIDUAL: f64 = 3e-3;
 /// Smallest standard deviation of third differences, scaled to white noise, over the residual of a motion with noise alone: white noise has 1.
 const NOISE_SHARE: f64 = 0.5;
 /// Largest number of foreign tones that are subtracted: mains hum and its harmonics.
 const LINES: usize = 8;
 /// Smallest significant harmonic, in standard errors.
-const SIGNIFICANT: f64 = 4.0;
+const SIGNIFICANT_HARMONIC: f64 = 4.0;
 /// Smallest even harmonic of an asymmetric motion, over the larger odd one next to it: of the second over the third, symmetric motions have about
 /// 0.01, irregular ones 2 and more.
 pub(crate) const ASYMMETRIC: f64 = 0.5;
 /// Harmonics that are fitted to a displacement.
-const HARMONICS: usize = 5;
+const RESPONSE_HARMONICS: usize = 5;
 
 /// All harmonics that the samples can show.
-const ALL: Measurand = Measurand::Acceleration;
+const ALL_HARMONICS: Measurand = Measurand::Acceleration;
 
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
 pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
-    let count = harmonics_of(measurand, samples_per_period, HARMONICS);
+    let count = harmonics_of(measurand, samples_per_period, RESPONSE_HARMONICS);
     [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
 }
 
@@ -68,7 +68,7 @@ struct Content {
 impl Content {
     /// Whether a residual is left that is not noise.
     fn is_irregular(&self) -> bool {
-        self.rest > STEADY && self.noise < NOISE_SHARE * self.rest
+        self.rest > STEADY_RESIDUAL && self.noise < NOISE_SHARE * self.rest
     }
 
     /// Whether an even harmonic is more than noise and more than [`ASYMMETRIC`] of the larger odd one next to it, as displacements. `order`: how
@@ -80,7 +80,7 @@ impl Content {
                 .map_or(0.0, |harmonic| harmonic / (n as f64).powi(order))
         };
         let even = (2..self.harmonics.len() + 2).step_by(2);
-        let significant = (SIGNIFICANT.powi(2) + 2.0 * (even.len() as f64).ln()).sqrt();
+        let significant = (SIGNIFICANT_HARMONIC.powi(2) + 2.0 * (even.len() as f64).ln()).sqrt();
         let neighbour = |n: usize| displacement(n + 1).max(if n > 2 { displacement(n - 1) } else { 0.0 });
         even.clone().any(|n| {
             self.harmonics[n - 2] > significant * self.errors[n - 2] && displacement(n) > ASYMMETRIC * neighbour(n)
@@ -168,7 +168,7 @@ impl Content {
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, knowledge, omega, 0, ALL)?;
+    let content = Content::of(samples, knowledge, omega, 0, ALL_HARMONICS)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
     Some(Tone {
@@ -203,7 +203,7 @@ pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) ->
 fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
     let content = knowledge
         .shaker
-        .and_then(|_| Content::of(samples, knowledge, omega, 1, ALL));
+        .and_then(|_| Content::of(samples, knowledge, omega, 1, ALL_HARMONICS));
     content.is_some_and(|content| content.is_asymmetric(knowledge.target.measurands[1].order()))
 }
 
@@ -246,7 +246,7 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
     let turns = (2..=LONGEST_CYCLE).flat_map(|m| (1..m).filter(move |j| *j == 1 || m % j > 0).map(move |j| (m, j)));
     let lines: Vec<(usize, f64)> = turns.map(|(m, j)| (m, chance(j as f64 / m as f64))).collect();
     let (periods, chance) = lines.iter().min_by(|one, other| one.1.total_cmp(&other.1))?;
-    (chance * (lines.len() as f64) < (-0.5 * SIGNIFICANT.powi(2)).exp()).then_some(*periods)
+    (chance * (lines.len() as f64) < (-0.5 * SIGNIFICANT_HARMONIC.powi(2)).exp()).then_some(*periods)
 }
 
 /// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
@@ -255,7 +255,7 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
 pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    let Some(content) = Content::of(samples, knowledge, omega.value, 0, ALL) else {
+    let Some(content) = Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) else {
         return Regime::Unknown;
     };
     if content.is_irregular() {
@@ -277,7 +277,7 @@ pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estim
         value: force(third_harmonic),
         uncertainty: force(content.errors[1]),
     };
-    let significant = SIGNIFICANT * content.errors[1];
+    let significant = SIGNIFICANT_HARMONIC * content.errors[1];
     let impacts = match is_known {
         true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
         false if third_harmonic > significant => impacts_by_harmonic(third, epsilon),

@@ -11,8 +11,8 @@ use num_complex::Complex64;
 use vines_model::numerics::complex_fit;
 
 use super::{
-    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NOTED, OpenLoop, PHASE, ROUNDS, Verdict, fitted,
-    of_response, quantity,
+    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NEWTON_STEPS, NOTED, OpenLoop, PHASE, Verdict,
+    fitted, of_response, quantity,
 };
 use crate::rig::{Rig, RigError, Scaled};
 use vines_scene::linear::LinearResponse;
@@ -22,9 +22,9 @@ use vines_scene::scene::{PLACES, frequencies};
 use vines_scene::shaker_path::ShakerPath;
 
 /// Periods of a window, and most windows at a frequency.
-const WINDOW: [usize; 2] = [8, 100];
+const STEADY_WINDOW: [usize; 2] = [8, 100];
 /// Largest relative change from window to window of a steady motion.
-const STEADY: f64 = 1e-4;
+const STEADY_CHANGE: f64 = 1e-4;
 
 /// Largest relative error of the model of reference over command. The control is stable below 1 (small gain: its closed loop is at most 1); half of
 /// it is a gain margin of 2.
@@ -47,7 +47,7 @@ pub(super) fn check(
         all.push(Steady::of(&mut rig, omega, amplitude)?);
     }
     let samples = window(linear.omega0, plan.knowledge.sample_time);
-    rig.end(samples / WINDOW[0])?;
+    rig.end(samples / STEADY_WINDOW[0])?;
     let near = &all[..PLACES.len()];
     let Steady { both: at, noise, .. } = near[PLACES.len() / 2];
     let curve = Curve::of(near, &linear);
@@ -101,7 +101,7 @@ pub(super) fn check(
 
 /// Samples of a window at a frequency, rad/s.
 fn window(omega: f64, sample_time: f64) -> usize {
-    (WINDOW[0] as f64 * TAU / (omega * sample_time)).round() as usize
+    (STEADY_WINDOW[0] as f64 * TAU / (omega * sample_time)).round() as usize
 }
 
 /// What response and reference read at a frequency when they are steady.
@@ -123,10 +123,10 @@ impl Steady {
         let samples = window(omega, rig.step);
         let (mut last, mut before) = ([Complex64::ZERO; 2], [Complex64::ZERO; 2]);
         let (mut noise, mut periods) = ([0.0; 2], 0.0);
-        for _ in 0..WINDOW[1] {
+        for _ in 0..STEADY_WINDOW[1] {
             rig.readings.clear();
             rig.drive(samples, omega, amplitude)?;
-            periods += WINDOW[0] as f64;
+            periods += STEADY_WINDOW[0] as f64;
             // A heavy table on the suspension of a light armature floats for hundreds of periods: a parabola in a window.
             let both = [1, 2].map(|channel| fitted(&rig.readings, channel, 2, &rig.target, omega));
             let change = (0..2)
@@ -134,7 +134,7 @@ impl Steady {
                 .fold(0.0, f64::max);
             (before, last, noise) = (last, both.map(|(phasor, _)| phasor), both.map(|(_, rest)| rest));
             // A reading that is no number never settles.
-            if change < STEADY || change.is_nan() {
+            if change < STEADY_CHANGE || change.is_nan() {
                 break;
             }
         }
@@ -188,7 +188,7 @@ impl Curve {
             .unwrap_or_else(|| (Vector3::from_element(nothing), Matrix3::from_element(nothing)));
         let slope_at = |at: Complex64| RowVector3::new(Complex64::ZERO, Complex64::ONE, 2.0 * at);
         let mut root = -found[0] / found[1];
-        for _ in 0..ROUNDS {
+        for _ in 0..NEWTON_STEPS {
             root -= (row(root) * found)[0] / (slope_at(root) * found)[0];
         }
         let rest: f64 = rows
@@ -213,7 +213,7 @@ impl Curve {
         LinearResponse {
             omega0: self.natural,
             damping_rate: self.damping,
-            uncertainty: self.u_rate.max(NOTED[0] * STEADY * self.natural),
+            uncertainty: self.u_rate.max(NOTED[0] * STEADY_CHANGE * self.natural),
             gain: Complex64::new(self.damping / self.natural, 1.0) / self.slope,
             u_gain: self.u_gain,
             particle: ParticleState::Unknown,
@@ -243,7 +243,7 @@ fn of_reference(path: &ShakerPath, stated: &ShakerPath, gain: f64, error: f64) -
         quantity(
             "reference over command, largest relative error of its model",
             "",
-            [error, STEADY, 0.0],
+            [error, STEADY_CHANGE, 0.0],
             ROBUST,
             Some(Verdict::ShakerResonance),
         ),
@@ -255,7 +255,7 @@ fn noted(name: &'static str, unit: &'static str, measured: f64, expected: f64, t
     quantity(
         name,
         unit,
-        [measured, STEADY * measured.abs(), expected],
+        [measured, STEADY_CHANGE * measured.abs(), expected],
         tolerance,
         None,
     )

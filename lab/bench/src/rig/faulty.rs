@@ -102,7 +102,7 @@ impl RigFault {
 }
 
 /// Healthy readings that are kept, in hundredths of a natural period: more than one period.
-const KEPT: usize = 128;
+const READINGS_KEPT: usize = 128;
 /// A natural frequency that is a tenth higher needs this many times the stiffness.
 const STIFFER: f64 = 1.21;
 
@@ -199,7 +199,7 @@ impl Faulty {
             SensorFault::Reversed => -value,
             SensorFault::Saturated => {
                 // A fault from the start meets no motion yet.
-                let level = if self.begins < self.samples(KEPT) {
+                let level = if self.begins < self.samples(READINGS_KEPT) {
                     largest
                 } else {
                     *self.before.get_or_insert(largest)
@@ -257,7 +257,7 @@ impl Rig for Faulty {
         let mut sensors = changed.unwrap_or(&mut self.rig).sense()?;
         self.past
             .push_back([sensors.response, sensors.reference.unwrap_or(0.0)]);
-        if self.past.len() > self.samples(KEPT) + elapsed.unwrap_or(0) {
+        if self.past.len() > self.samples(READINGS_KEPT) + elapsed.unwrap_or(0) {
             self.past.pop_front();
         }
         let Some(elapsed) = elapsed else {

@@ -3,8 +3,9 @@
 //! Near the natural frequency a structure with the impact force I has the response `z' = F + I - (s + d) z` in phasors, where `s = i (omega - omega0)`,
 //! and a shaker makes of a command u the reference `F = K u - (r - d) z` ([`ShakerPath`]): the moving structure takes the force away. The command is
 //! the inverse, `u = (F + (r - d) z)/K`, with the *measured* response z: an observer predicts z and I from the command, `z' = K u + I - (s + r) z` and
-//! `I' = 0`, and corrects both by the reading. What is left of the error of the measured reference, by errors of K and r, is integrated. This correction
-//! is the reference that command and response make by the path, less the one that is read: beyond the reference asked for, they contradict each other.
+//! `I' = 0`, and corrects both by the reading. What is left of the error of the measured reference, by errors of K and r, is integrated.
+//!
+//! The reference that is read contradicts command and response where it differs from the one that they make by the path, `K u - (r - d) z`.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
@@ -12,13 +13,12 @@ use num_complex::Complex64;
 
 use super::{Drive, RigError};
 use vines_scene::knowledge::{Knowledge, Target};
-use vines_scene::shaker_path::{BANDWIDTH, DETECTOR, HARMONICS, OBSERVER, SECOND, ShakerPath, rate_of};
+use vines_scene::shaker_path::{BANDWIDTH, DETECTOR, OBSERVER, ODD_HARMONICS, SECOND, ShakerPath, rate_of};
 
-/// Share of the command's fundamental that an amplifier loses which has failed; clipping at half of the command loses 0.39. At the natural frequency
-/// this is the share of the reference, over the drop-out. An error of the whole reference is a failure whatever the drop-out: it is not the reference
-/// asked for that is left then. And a reference that never reaches this share is not there, of a broken stinger.
-const SHARE: f64 = 0.25;
-/// Phase for which such an error lasts, rad: in this time the control halves an error. Impacts and drive change the reference all the time while the
+/// Largest difference between both, as a share of what the command makes of a structure that does not move: of the reference, this share over the
+/// drop-out, and at most all but this share. An amplifier that clips at half of the command loses 0.39 of it, a broken stinger all.
+const LOST_SHARE: f64 = 0.25;
+/// Phase for which such a difference lasts, rad: in this time the control halves an error. Impacts and drive change the reference all the time while the
 /// controller searches, where little of it is left.
 pub(crate) const OFF: f64 = LN_2 / BANDWIDTH;
 
@@ -26,15 +26,15 @@ pub(crate) const OFF: f64 = LN_2 / BANDWIDTH;
 #[derive(Debug, Clone, Default)]
 struct Detector {
     offset: f64,
-    phasors: [Complex64; HARMONICS],
+    phasors: [Complex64; ODD_HARMONICS],
 }
 
 impl Detector {
     /// Takes a reading at a phase of the oscillator, which turns by `turn` from sample to sample, rad.
     fn take(&mut self, reading: f64, phase: f64, turn: f64, share: f64) {
         let sampled = (0.5 * (PI / turn + 1.0)) as usize;
-        let (first, mut rotors) = (Complex64::cis(phase), [Complex64::ZERO; HARMONICS]);
-        (0..sampled.min(HARMONICS)).fold(first, |rotor, n| {
+        let (first, mut rotors) = (Complex64::cis(phase), [Complex64::ZERO; ODD_HARMONICS]);
+        (0..sampled.min(ODD_HARMONICS)).fold(first, |rotor, n| {
             rotors[n] = rotor;
             rotor * first * first
         });
@@ -76,10 +76,8 @@ pub(crate) struct ReferenceControl {
     times: f64,
     /// Samples so far with the command at its limit.
     pub clipped: usize,
-    /// Phase for which the reference has been off, or the command at its limit, and for which the reading has been small, rad.
-    off: f64,
-    quiet: f64,
-    /// Phase for which the correction has been beyond what is asked for, rad.
+    /// Phase for which the command has been at its limit, and for which the reference has contradicted command and response, rad.
+    limited: f64,
     contradicted: f64,
 }
 
@@ -102,8 +100,7 @@ impl ReferenceControl {
             command: Complex64::ZERO,
             times: 0.0,
             clipped: 0,
-            off: 0.0,
-            quiet: 0.0,
+            limited: 0.0,
             contradicted: 0.0,
         })
     }
@@ -111,7 +108,7 @@ impl ReferenceControl {
     /// Takes the scaled readings of response and reference. Returns the command for the coming `step`, s, in which the controller asks for `drive`.
     ///
     /// # Errors
-    /// A reference that has not followed for [`OFF`], or for longer under a slow control.
+    /// A command at its limit, or a reference that contradicts command and response, for [`OFF`], or for longer under a slow control.
     pub fn command(&mut self, [response, reading]: [f64; 2], drive: Drive, step: f64) -> Result<Drive, RigError> {
         let Drive { omega, amplitude, .. } = drive;
         let [of_response, displacement] = [0, 1].map(|channel| self.target.displacement(channel, omega));
@@ -130,32 +127,20 @@ impl ReferenceControl {
         }
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
-        let largest = self.asked * (SHARE / self.path.drop_out()).min(1.0);
+        let [expected, read] = [self.path.gain * self.command - moved, self.asked - error];
+        let largest = self.asked * (LOST_SHARE / self.path.drop_out()).min(1.0 - LOST_SHARE);
         let is_driven = self.asked > 0.0 && amplitude > 0.0;
         let longer = |phase: f64, is: bool| if is && is_driven { phase + omega * step } else { 0.0 };
-        self.off = longer(self.off, error.norm() > largest || self.times > 1.0);
-        self.quiet = longer(self.quiet, reading.abs() * displacement.norm() < SHARE * self.asked);
-        self.contradicted = longer(self.contradicted, self.correction.norm() > self.asked);
+        self.limited = longer(self.limited, self.times > 1.0);
+        self.contradicted = longer(self.contradicted, (expected - read).norm() > largest);
         let longest = OFF / self.path.speed;
-        let unit = ["m", "N"][usize::from(self.path.by_force)];
-        if self.off > longest && self.times > 1.0 {
+        if self.limited > longest {
             return Err(RigError::AmplifierLimit { times: self.times });
         }
-        if self.off.max(self.quiet) > longest {
-            let cause = if self.quiet > longest {
-                "next to nothing is left: the sensor of the reference is dead, or the stinger is broken"
-            } else {
-                "the amplifier clips or is off, a sensor or its sign is wrong, too little is left at the resonance (the drop-out of `vines check`), or \
-                 irregular impacts on a heavy armature or table change it faster than the control follows"
-            };
-            let [asked, error] = [self.asked, error.norm()].map(|value| value / self.path.base_per_reference);
-            let periods = longest / TAU;
-            return Err(RigError::ReferenceOff { asked, error, periods, unit, cause });
-        }
         if self.contradicted > longest {
-            let [expected, read] = [self.correction + self.asked, self.asked - error]
-                .map(|value| value.norm() / self.path.base_per_reference);
-            return Err(RigError::PathContradicted { expected, read, unit });
+            let [expected, read] = [expected, read].map(|value| value.norm() / self.path.base_per_reference);
+            let unit = ["m", "N"][usize::from(self.path.by_force)];
+            return Err(RigError::PathContradicted { expected, read, periods: longest / TAU, unit });
         }
         if amplitude == 0.0 {
             self.correction = Complex64::ZERO;

@@ -12,7 +12,8 @@ use vines_bench::backbone::LevelPoint;
 use vines_bench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_bench::experiment::{ExperimentError, SearchFound};
 use vines_bench::identification::{
-    IdentificationError, Lock, Regime, ResonancePoint, WINDOW, decay_points, foreign_tone, identify, regime_by_response,
+    DECAY_WINDOW, IdentificationError, Lock, Regime, ResonancePoint, decay_points, foreign_tone, identify,
+    regime_by_response,
 };
 use vines_bench::loop_check::check;
 use vines_bench::record::{Record, Sample};
@@ -357,7 +358,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     let clean = record(&mut Simulated::new(scene.plant, scene.start).unwrap(), &scene).unwrap();
     let truth = crossings(&clean, &scene);
     let rms = |record: &Record| {
-        let points = decay_points(record, &scene.knowledge(), WINDOW).points;
+        let points = decay_points(record, &scene.knowledge(), DECAY_WINDOW).points;
         let above = points.iter().filter(|point| point.c > COMPARED_ABOVE);
         let errors = above.filter_map(|point| Some(point.sigma - common::at(&truth, point.tau)?));
         let errors: Vec<f64> = errors.collect();
@@ -367,7 +368,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     let [fit, through_noise] = [rms(&clean), rms(&noisy(&clean, 40.0, 1))];
     assert!(fit <= 0.02 && through_noise <= 0.04);
     // The zero crossings that the fit is compared with do not depend on the sample time: here of every fourth sample.
-    let last = decay_points(&clean, &scene.knowledge(), WINDOW).points;
+    let last = decay_points(&clean, &scene.knowledge(), DECAY_WINDOW).points;
     let last = last.iter().rfind(|point| point.c > COMPARED_ABOVE).unwrap().tau;
     let scene = dimensionless(&["controller.samples_per_period=400"]);
     let fine = record(&mut Simulated::new(scene.plant, scene.start).unwrap(), &scene).unwrap();

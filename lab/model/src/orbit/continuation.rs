@@ -189,19 +189,19 @@ impl ContinuationLimits {
 }
 
 /// Steps below this end a branch.
-const SHORTEST: f64 = 1e-7;
+const SHORTEST_STEP: f64 = 1e-7;
 /// Cosine of the largest turn of the tangent in a step.
 const STRAIGHT: f64 = 0.98;
 /// Part of the longest step with which a branch reaches the one that it joins: near there, the plane at the end of a step meets both.
 const APPROACH: f64 = 1.0 / 256.0;
 /// Fraction of a step to which the end of a branch or a bifurcation is located.
-const FINEST: f64 = 1e-12;
+const LOCATION_FRACTION: f64 = 1e-12;
 /// Difference in sigma of a bifurcation that is located twice.
-const SAME: f64 = 1e-9;
+const SAME_SIGMA: f64 = 1e-9;
 /// Largest rounding error of a test function: in conservative motions, some of these functions are zero everywhere.
-const ROUNDING: f64 = 1e-9;
+const TEST_FUNCTION_ROUNDING: f64 = 1e-9;
 /// Largest distance of a multiplier from the circle where a crossing is located.
-const LOCATED: f64 = 1e-4;
+const CROSSING_DISTANCE: f64 = 1e-4;
 
 /// The curve of the motions of one pattern that satisfy a condition.
 struct Curve<'a> {
@@ -285,7 +285,7 @@ impl Curve<'_> {
                 let beyond = turned * (1.1 * apart.norm());
                 branch.special.extend(self.crossings(beyond, [next, start]));
             } else if let [first, .., last] = &branch.special[..]
-                && (first.motion.sigma - last.motion.sigma).abs() < SAME
+                && (first.motion.sigma - last.motion.sigma).abs() < SAME_SIGMA
             {
                 // The last step passed the start, and what is beyond it was known.
                 branch.special.pop();
@@ -317,7 +317,7 @@ impl Curve<'_> {
     fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
         let at = self.beside(from, tangent * step);
         let before = |part: f64| at(part).map(|end| !joins(from, &end)).ok_or(());
-        let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
+        let (end, _) = try_bisection(0.0, 1.0, LOCATION_FRACTION, before).ok()?;
         at(end)
     }
 
@@ -326,19 +326,19 @@ impl Curve<'_> {
         let at = self.beside(from, chord);
         let crossing = |kind: Bifurcation| {
             let [first, last] = [from, to].map(|motion| kind.test(&motion.map.monodromy));
-            if first * last >= 0.0 || first.abs().max(last.abs()) < ROUNDING {
+            if first * last >= 0.0 || first.abs().max(last.abs()) < TEST_FUNCTION_ROUNDING {
                 return None;
             }
             let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy) * first > 0.0);
-            let (_, beyond) = try_bisection::<()>(0.0, 1.0, FINEST, like_first).ok()?;
+            let (_, beyond) = try_bisection::<()>(0.0, 1.0, LOCATION_FRACTION, like_first).ok()?;
             let motion = at(beyond)?;
             // Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
             let imaginary = if kind == Bifurcation::NeimarkSacker {
-                LOCATED
+                CROSSING_DISTANCE
             } else {
                 0.0
             };
-            let is_on_circle = motion.on_circle(imaginary, LOCATED);
+            let is_on_circle = motion.on_circle(imaginary, CROSSING_DISTANCE);
             is_on_circle.then_some((beyond, BranchBifurcation { kind, motion }))
         };
         let kinds = [
@@ -383,7 +383,7 @@ fn continue_from(
         return branch;
     };
     let (mut tangent, mut step) = (first, limits.step / 8.0);
-    while step >= SHORTEST {
+    while step >= SHORTEST_STEP {
         if branch.points.len() >= limits.points {
             branch.ended[1] = BranchEnd::Points;
             break;

@@ -19,10 +19,10 @@ pub(super) struct Flight<S> {
     pub particle: [f64; 2],
 }
 
-/// A contact slower than this, over the half-width and the angular frequency, is a graze, where the motion after it has no derivative.
-const GRAZING: f64 = 1e-9;
+/// A contact slower than this, over the half-width and the angular frequency of the drive, is a graze, where the motion after it has no derivative.
+pub(super) const GRAZING: f64 = 1e-9;
 /// Most steps of a flight: far more than any flight needs, except in chatter.
-const STEPS: usize = 4000;
+const MOST_FLIGHT_STEPS: usize = 4000;
 
 impl<S: AsRef<[(Section, Vector2<f64>)]>> Flight<S> {
     /// Displacement and velocity of the cavity after the time `t`.
@@ -69,7 +69,7 @@ impl<S: AsRef<[(Section, Vector2<f64>)]>> Flight<S> {
             return None;
         }
         let mut phase = 0.0;
-        for _ in 0..STEPS {
+        for _ in 0..MOST_FLIGHT_STEPS {
             let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
             phase += step;
             if phase > TAU * periods {

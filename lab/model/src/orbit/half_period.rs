@@ -16,7 +16,7 @@ use super::multipliers::{self, Impact};
 use super::symmetric::{Particle, SymmetricMotion, alternating};
 
 /// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
-const EXACT: f64 = 1e-8;
+const HALF_PERIOD_ERROR: f64 = 1e-8;
 
 /// The map of half a period, and its multipliers.
 pub(super) struct HalfPeriod {
@@ -51,7 +51,7 @@ impl HalfPeriod {
             particle: [line[0], motion.speed],
         };
         let (elapsed, wall) = flight.contact([b, motion.after[1] - motion.speed], b, 1.0)?;
-        let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < EXACT;
+        let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < HALF_PERIOD_ERROR;
         is_half_a_period.then(|| Self {
             impact: impact(&parts, motion),
             flows: parts.iter().map(|part| part.0).zip(flows).collect(),
@@ -80,13 +80,13 @@ impl HalfPeriod {
     /// section without a natural one.
     pub(super) fn shares(&self, multiplier: Complex<f64>, omega: f64) -> Option<Vec<f64>> {
         /// Relative distance of the shift from the multiplier: the matrix is not singular, and other multipliers are farther.
-        const BESIDE: f64 = 1e-9;
+        const SHIFT_OFFSET: f64 = 1e-9;
         let scales: Vec<f64> = self
             .parts
             .iter()
             .flat_map(|part| energy_scales(&part.0, omega))
             .collect();
-        let (map, shift) = (map(&self.flows, self.impact), multiplier * (1.0 + BESIDE));
+        let (map, shift) = (map(&self.flows, self.impact), multiplier * (1.0 + SHIFT_OFFSET));
         let shifted = DMatrix::from_fn(scales.len(), scales.len(), |row, column| {
             let entry = Complex::from(map[(row, column)] * scales[row] / scales[column]);
             if row == column { entry - shift } else { entry }

@@ -34,13 +34,13 @@ pub(super) struct Impact {
 }
 
 /// Size of the last correction of a zero, over the larger of its modulus and 1, and, where rounding lets it fall no further, the largest.
-const CONVERGED: f64 = 1e-13;
-const ROUNDING: f64 = 1e-9;
-/// Largest number of rounds: about ten are needed.
-const ROUNDS: usize = 60;
+const ZERO_CONVERGED: f64 = 1e-13;
+const ZERO_ROUNDING: f64 = 1e-9;
+/// Largest number of rounds.
+const MOST_ROUNDS: usize = 60;
 /// Distance of the start from the zeros of `det(F + z)`, over their moduli. Exactly there, double ones would not part, and pairs could not become
-/// real. The number of rounds hardly depends on it.
-const BESIDE: f64 = 1e-3;
+/// real.
+const START_OFFSET: f64 = 1e-3;
 
 /// The multipliers, in no order; `None` where the zeros do not converge.
 pub(super) fn multipliers(flows: &[(Section, Matrix2<f64>)], impact: Impact) -> Option<Vec<Complex<f64>>> {
@@ -68,7 +68,7 @@ pub(super) fn multipliers(flows: &[(Section, Matrix2<f64>)], impact: Impact) -> 
         }
     }
     let parts: Vec<Part> = sections.into_iter().map(|(_, part)| part).collect();
-    let beside = |(n, zero): (usize, Complex<f64>)| zero * (1.0 + Complex::from_polar(BESIDE, n as f64));
+    let beside = |(n, zero): (usize, Complex<f64>)| zero * (1.0 + Complex::from_polar(START_OFFSET, n as f64));
     let mut zeros: Vec<_> = parts
         .iter()
         .flat_map(|part| roots(part.u, part.v))
@@ -118,7 +118,7 @@ fn field(section: &Section) -> Matrix2<f64> {
 fn correct(zeros: &mut [Complex<f64>], parts: &[Part], impact: Impact) -> Option<()> {
     // The last corrections; of a zero that is found, 0.
     let mut last = vec![f64::INFINITY; zeros.len()];
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         for n in 0..zeros.len() {
             if last[n] == 0.0 {
                 continue;
@@ -129,7 +129,7 @@ fn correct(zeros: &mut [Complex<f64>], parts: &[Part], impact: Impact) -> Option
                 return None;
             }
             zeros[n] -= correction;
-            let found = size < CONVERGED || size < ROUNDING && size > 0.5 * last[n];
+            let found = size < ZERO_CONVERGED || size < ZERO_ROUNDING && size > 0.5 * last[n];
             last[n] = if found { 0.0 } else { size };
         }
         if last.iter().all(|size| *size == 0.0) {
@@ -145,7 +145,7 @@ fn has_trace(zeros: &[Complex<f64>], parts: &[Part], Impact { mu, kappa }: Impac
     let trace: f64 = parts.iter().map(own).sum();
     let sum: Complex<f64> = zeros.iter().sum();
     let size: f64 = parts.iter().map(|part| own(part).abs()).sum();
-    (trace - sum).norm() <= ROUNDING * size
+    (trace - sum).norm() <= ZERO_ROUNDING * size
 }
 
 /// The correction of a zero: the polynomial over its derivative, both over the distances from all others.

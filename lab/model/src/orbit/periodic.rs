@@ -53,7 +53,7 @@ pub enum Bifurcation {
 }
 
 /// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
-const STEP: f64 = 1e-6;
+const MAP_DIFFERENCE: f64 = 1e-6;
 
 impl Bifurcation {
     /// As in a table.
@@ -115,7 +115,7 @@ impl Condition {
                     moved[n] += step;
                     follow(scene, pattern, &moved, |_, _| {}).map_or(f64::NAN, |map| value(&map))
                 };
-                let slope = |n: usize| (at(n, STEP) - at(n, -STEP)) / (2.0 * STEP);
+                let slope = |n: usize| (at(n, MAP_DIFFERENCE) - at(n, -MAP_DIFFERENCE)) / (2.0 * MAP_DIFFERENCE);
                 (value(map), RowVector6::from_fn(|_, n| slope(n)))
             }
         }
@@ -299,13 +299,13 @@ impl Periodic {
 }
 
 /// Largest distance of a settling motion from itself one repetition later, over b and b omega0, from which Newton's method starts.
-pub(crate) const NEAR: f64 = 1e-2;
+pub(crate) const SETTLING_DISTANCE: f64 = 1e-2;
 /// Largest distance of an exact motion from itself one repetition later.
-const EXACT: f64 = 1e-8;
+const ORBIT_ERROR: f64 = 1e-8;
 /// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.
 const MULTIPLES: usize = 3;
 /// Longest pattern in the search, impacts.
-pub(super) const LONGEST: usize = 48;
+pub(super) const LONGEST_PATTERN: usize = 48;
 
 /// The periodic motion, stable or neutral, that `start` = (q1, q1', q2, q2') leads to after `periods` at the detuning `sigma` and
 /// the scene's G; None without a repeating pattern, without impacts, or if the particle sticks.
@@ -333,21 +333,23 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
     let mut unstable = None;
-    let found = patterns(impacts, first, NEAR).take(MULTIPLES).find_map(|pattern| {
-        let found = Periodic::find(scene, &pattern, &guess, conditions)?;
-        let close = (found.unknowns() - guess).norm() < 10.0 * NEAR;
-        if close && found.is_unstable() {
-            unstable.get_or_insert(found);
-            return None;
-        }
-        close.then_some(found)
-    });
+    let found = patterns(impacts, first, SETTLING_DISTANCE)
+        .take(MULTIPLES)
+        .find_map(|pattern| {
+            let found = Periodic::find(scene, &pattern, &guess, conditions)?;
+            let close = (found.unknowns() - guess).norm() < 10.0 * SETTLING_DISTANCE;
+            if close && found.is_unstable() {
+                unstable.get_or_insert(found);
+                return None;
+            }
+            close.then_some(found)
+        });
     let Some(found) = found else {
         return unstable;
     };
     // The pattern may be a multiple of the motion's own pattern: near a period doubling the motion settles slowly, in alternation.
     let impacts = Impacts::after(scene, sigma, &found.bounces[0])?;
-    let shortest = patterns(impacts, found.bounces[0], EXACT)
+    let shortest = patterns(impacts, found.bounces[0], ORBIT_ERROR)
         .take_while(|pattern| pattern.walls.len() < found.bounces.len())
         .next();
     match shortest {
@@ -360,7 +362,7 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
 fn patterns(impacts: Impacts, first: Bounce, tolerance: f64) -> impl Iterator<Item = ImpactPattern> {
     let half = std::f64::consts::PI;
     let mut walls = vec![first.wall];
-    impacts.take(LONGEST).filter_map(move |(_, then)| {
+    impacts.take(LONGEST_PATTERN).filter_map(move |(_, then)| {
         let half_periods = ((then.phase - first.phase) / half).round();
         let mirrored = half_periods % 2.0 == 1.0;
         let sign = if mirrored { -1.0 } else { 1.0 };

@@ -16,7 +16,7 @@ use nalgebra::{Complex, Matrix6, SMatrix, Vector4, Vector6};
 use thiserror::Error;
 
 use super::Orbit;
-use super::periodic::NEAR;
+use super::periodic::SETTLING_DISTANCE;
 use super::return_map::plant_at;
 use super::stability;
 use super::study::{at_amplitude, at_speed, stable_resonant};
@@ -176,7 +176,7 @@ pub fn resonant_motion_under(
 /// Rounding error of a multiplier that is 1.
 const NEUTRAL: f64 = 1e-9;
 /// Longest motion that is searched, periods of the base.
-const LONGEST: u32 = 32;
+const LONGEST_MOTION: u32 = 32;
 
 /// The motion that a state at phase 0 of the base leads to under a drive within `settle` periods; `None` if it does not repeat within 32.
 pub fn settled_motion(
@@ -193,10 +193,10 @@ pub fn settled_motion(
     plant.advance(drive, settle as f64 * TAU / omega)?;
     let scale = scale(parameters);
     let here = unknowns(&scale, &plant.state(), omega, amplitude);
-    for periods in 1..=LONGEST {
+    for periods in 1..=LONGEST_MOTION {
         plant.advance(drive, TAU / omega)?;
         let apart = (unknowns(&scale, &plant.state(), omega, amplitude) - here).amax();
-        if apart < NEAR {
+        if apart < SETTLING_DISTANCE {
             match Solver::new(parameters, definition, periods, conditions)?.solve(0.0, here) {
                 // A particle that only slides may slide anywhere: one multiplier is 1.
                 Ok(Solution { motion, .. }) if motion.growth() < 1.0 + NEUTRAL => return Ok(Some(motion)),

@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
-use super::periodic::{Bifurcation, Condition, LONGEST, Periodic};
+use super::periodic::{Bifurcation, Condition, LONGEST_PATTERN, Periodic};
 use super::return_map::ImpactPattern;
 use super::study::{least_excitation, symmetric_orbits};
 use crate::Dimensionless;
@@ -37,9 +37,9 @@ pub struct Component {
 pub const DOUBLINGS: usize = 3;
 
 /// Detunings at which symmetric motions are computed, over the range.
-const GRID: usize = 1200;
+const DETUNINGS_SEARCHED: usize = 1200;
 /// Largest difference of two motions that are the same.
-const SAME: f64 = 1e-6;
+const SAME_MOTION: f64 = 1e-6;
 
 /// The exact frequency response at the scene's G over the range of sigma in `limits`: symmetric 1:1 motions, and what branches off them at
 /// `doublings` symmetry breakings and period doublings in a row.
@@ -48,7 +48,7 @@ pub fn response(scene: &Dimensionless, limits: &ContinuationLimits, doublings: u
     let found = FrequencyResponse { g: scene.g, components: Vec::new() };
     let mut search = Search { scene, limits, doublings, found };
     let [low, high] = limits.sigma;
-    let grid: Vec<f64> = equally_spaced(low, high, GRID).collect();
+    let grid: Vec<f64> = equally_spaced(low, high, DETUNINGS_SEARCHED).collect();
     let least = |sigma: f64| least_excitation(scene, sigma);
     // An isola between two detunings of the grid surrounds a minimum of the least excitation.
     let narrow = grid
@@ -87,7 +87,7 @@ impl Search<'_> {
         self.found
             .components
             .push(Component { name: branch.pattern().name(), branch });
-        if depth == self.doublings || 2 * impacts > LONGEST {
+        if depth == self.doublings || 2 * impacts > LONGEST_PATTERN {
             return;
         }
         for special in special {
@@ -155,7 +155,7 @@ impl Branch {
             return false;
         }
         let conditions = [Condition::Sigma(motion.sigma), Condition::Excitation(motion.g)];
-        self.leads_to(scene, motion, conditions, |motion| motion.sigma, SAME)
+        self.leads_to(scene, motion, conditions, |motion| motion.sigma, SAME_MOTION)
     }
 
     /// Whether Newton's method for `conditions` leads from this branch to a motion, within `same`. `along` is a coordinate that the
@@ -171,7 +171,7 @@ impl Branch {
         self.points.windows(2).any(|pair| {
             let [from, to] = [&pair[0], &pair[1]];
             // Where the curve bends, its points are close together.
-            if from.distance(motion).max(to.distance(motion)) > 1.2 * (from.distance(to) + SAME) {
+            if from.distance(motion).max(to.distance(motion)) > 1.2 * (from.distance(to) + SAME_MOTION) {
                 return false;
             }
             let part = ((along(motion) - along(from)) / (along(to) - along(from))).clamp(0.0, 1.0);

@@ -10,6 +10,7 @@ use lovines::{Drive, Event, Parameters, Plant, State, Variation};
 use nalgebra::{Complex, Matrix4, Matrix4x6, RowVector6, Vector4, Vector6};
 use serde::Serialize;
 
+use super::flight::GRAZING;
 use crate::oscillator::ForcedOscillator;
 use crate::{Definition, Dimensionless, Sensor};
 
@@ -145,9 +146,7 @@ pub(super) fn plant_at(parameters: &Parameters, state: State, drive: Drive, phas
 }
 
 /// Longest flight, periods.
-const LONGEST: f64 = 64.0;
-/// An impact slower than this, over `b Omega`, is a graze, where the motion after it has no derivative.
-const GRAZING: f64 = 1e-9;
+const LONGEST_FLIGHT: f64 = 64.0;
 
 /// The impacts of a motion of the dimensionless plant, one after another, each with the state after it. They end where the particle sticks, grazes a
 /// wall, or meets none within many periods.
@@ -192,7 +191,7 @@ impl Iterator for Impacts {
             ControlFlow::Break(())
         };
         self.plant
-            .advance_until(self.drive, LONGEST * TAU / omega, first)
+            .advance_until(self.drive, LONGEST_FLIGHT * TAU / omega, first)
             .ok()?;
         let Some(event @ Event::Impact { t, wall, velocity }) = next else {
             return None;

@@ -310,14 +310,14 @@ pub struct StructureOrbits {
 /// Frequencies searched, over the natural frequency of the oscillator or the driven mode.
 pub const SEARCHED: [f64; 2] = [0.2, 3.0];
 /// Least number of frequencies at which orbits are searched over a range.
-const GRID: usize = 4000;
+const FEWEST_FREQUENCIES: usize = 4000;
 /// Difference of neighbouring frequencies over the distance from the nearest mode, which counts at least as its mass ratio: the detunings where it is of
 /// order one.
 const SPACING: f64 = 0.002;
 /// Widths, in the angle along a loop, to which a change of stability and the end of a branch are located.
-const LOCATED: f64 = 1e-11;
+const LOCATION_WIDTH: f64 = 1e-11;
 /// Amplitudes over b that are rounding: of a response that is zero, and of the harmonic part of an orbit that needs no drive.
-const ROUNDING: f64 = 1e-12;
+const AMPLITUDE_ROUNDING: f64 = 1e-12;
 
 impl StructureOrbits {
     /// The orbits of a host.
@@ -431,7 +431,7 @@ impl StructureOrbits {
                 .iter()
                 .map(|(omega0, epsilon)| (omega - omega0).hypot(epsilon * omega0));
             let spacing = distances.fold(f64::INFINITY, f64::min) * SPACING;
-            omega + spacing.min((high - low) / GRID as f64)
+            omega + spacing.min((high - low) / FEWEST_FREQUENCIES as f64)
         };
         std::iter::successors(Some(low), move |omega| Some(next(*omega)))
             .take_while(move |omega| *omega < high)
@@ -538,17 +538,17 @@ impl StructureOrbits {
     /// The range of the backbone of the section `driven`, by first-order theory: all frequencies from slow particles to a speed of 1.5 b omega0,
     /// beyond which symmetric motions are unstable.
     pub fn range(&self, driven: usize, points: usize) -> Option<StructureRange> {
-        const FASTEST: f64 = 1.5;
+        const FASTEST_PARTICLE: f64 = 1.5;
         let Dimensionless { omega0, b, epsilon, lambda, r, definition, .. } = self.first_order(driven)?.numbers;
         let flow = SlowFlow::new(lambda, r);
-        let detunings =
-            equally_spaced(0.0, FASTEST, GRID).map(|speed| flow.detuning_at(speed, definition.off_resonance()));
+        let detunings = equally_spaced(0.0, FASTEST_PARTICLE, FEWEST_FREQUENCIES)
+            .map(|speed| flow.detuning_at(speed, definition.off_resonance()));
         let (low, high) = numerics::range((0.0, 0.0), detunings);
         // First-order theory leaves out detunings of order epsilon, and other modes.
         let omega = [low - 1.0, high + 1.0].map(|sigma| (1.0 + epsilon * sigma).clamp(SEARCHED[0], SEARCHED[1]));
         Some(StructureRange {
             omega: omega.map(|omega| omega * omega0),
-            speed: FASTEST * b * omega0,
+            speed: FASTEST_PARTICLE * b * omega0,
             points,
         })
     }
@@ -590,7 +590,7 @@ impl StructureOrbits {
 
     /// The orbit as [`Self::accept`], if the phase of its response has the sign that is wanted.
     fn accept_resonant(&self, motion: &SymmetricMotion, with_stability: bool) -> Option<StructureOrbit> {
-        if motion.cavity.norm() < ROUNDING * self.particle.half_width {
+        if motion.cavity.norm() < AMPLITUDE_ROUNDING * self.particle.half_width {
             // Without a drive, its phase is free.
             let turned = wrapped(motion.drive.arg() + motion.phase + FRAC_PI_2);
             let mut orbit = self.accept(motion, with_stability)?;
@@ -625,7 +625,7 @@ impl StructureOrbits {
     fn accept(&self, motion: &SymmetricMotion, with_stability: bool) -> Option<StructureOrbit> {
         let orbit = self.told(motion);
         let sizes = [orbit.speed, orbit.response, orbit.drive];
-        let is_motion = orbit.speed > 0.0 && orbit.response > ROUNDING * self.particle.half_width;
+        let is_motion = orbit.speed > 0.0 && orbit.response > AMPLITUDE_ROUNDING * self.particle.half_width;
         if sizes.iter().any(|size| !size.is_finite()) || !is_motion {
             return None;
         }
@@ -766,7 +766,7 @@ impl StructureOrbits {
         }
         let at = |angle: f64| at(angle, true);
         let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
-        let (before, beyond) = try_bisection(from, to, LOCATED, like_first).ok()?;
+        let (before, beyond) = try_bisection(from, to, LOCATION_WIDTH, like_first).ok()?;
         // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
         let orbit = at(if outside < second.unstable() { beyond } else { before })?;
         let multiplier = *orbit.multipliers.get(orbit.multipliers.len() - orbit.unstable())?;
@@ -822,6 +822,6 @@ fn since_impact(motion: &SymmetricMotion) -> (f64, f64) {
 /// The last orbit from `from`, where there is one, towards `to`, where there is none.
 fn end(at: &impl Fn(f64, bool) -> Option<StructureOrbit>, from: f64, to: f64) -> Option<StructureOrbit> {
     let is_orbit = |angle: f64| Ok::<_, ()>(at(angle, false).is_some());
-    let (last, _) = try_bisection(from, to, LOCATED, is_orbit).ok()?;
+    let (last, _) = try_bisection(from, to, LOCATION_WIDTH, is_orbit).ok()?;
     (last != from).then(|| at(last, true)).flatten()
 }

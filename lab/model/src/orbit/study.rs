@@ -92,7 +92,7 @@ pub(super) fn least_excitation(scene: &Dimensionless, sigma: f64) -> f64 {
 }
 
 /// Largest last step of the frequency, as a share of epsilon, and of the speed.
-const CONVERGED: f64 = 1e-9;
+const LAST_STEP: f64 = 1e-9;
 /// Difference of the first two frequencies, as a share of epsilon, and of the first two speeds: far above rounding, far below the curvature.
 const SECANT: f64 = 1e-4;
 
@@ -127,7 +127,7 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
         let [square, linear, constant] = motions.resonance();
         Some((square * b + linear) * b + constant)
     };
-    let omega = secant(off, [guess * (1.0 + SECANT * epsilon), guess], CONVERGED * epsilon)?;
+    let omega = secant(off, [guess * (1.0 + SECANT * epsilon), guess], LAST_STEP * epsilon)?;
     let (motions, b) = motion(omega)?;
     let motion = told(scene, &[orbits.told(&motions.at(b))])[0];
     let values = [omega, motion.c, motion.g];
@@ -138,5 +138,5 @@ pub(super) fn at_speed(scene: &Dimensionless, speed: f64) -> Option<Orbit> {
 pub fn at_amplitude(scene: &Dimensionless, c: f64) -> Option<Orbit> {
     let start = Manifold::new(scene.r).b(c, BranchSide::Right)?;
     let excess = |speed: f64| Some(at_speed(scene, speed)?.c - c);
-    at_speed(scene, secant(excess, [start * (1.0 + SECANT), start], CONVERGED)?)
+    at_speed(scene, secant(excess, [start * (1.0 + SECANT), start], LAST_STEP)?)
 }

@@ -28,7 +28,7 @@ pub struct Activation {
 }
 
 /// Speeds at which a minimum is bracketed.
-const GRID: u32 = 600;
+const SPEEDS_SEARCHED: u32 = 600;
 
 impl SlowFlow {
     /// Base amplitude that holds the particle speed `b` at the detuning `sigma`: `sqrt(loss^2 + spring^2)/C`.
@@ -72,8 +72,8 @@ impl SlowFlow {
 
 /// Infimum of `f` over the open interval where `wanted` holds.
 fn smallest((low, high): (f64, f64), wanted: impl Fn(f64) -> bool, f: impl Fn(f64) -> f64) -> Option<f64> {
-    let step = (high - low) / f64::from(GRID);
-    let best = (0..GRID)
+    let step = (high - low) / f64::from(SPEEDS_SEARCHED);
+    let best = (0..SPEEDS_SEARCHED)
         .map(|n| low + step * (f64::from(n) + 0.5))
         .filter(|b| wanted(*b))
         .min_by(|first, second| f(*first).total_cmp(&f(*second)))?;
@@ -92,14 +92,14 @@ fn smallest((low, high): (f64, f64), wanted: impl Fn(f64) -> bool, f: impl Fn(f6
 }
 
 /// Points per period at which the largest displacement is looked for.
-const POINTS: f64 = 32.0;
+const POINTS_PER_PERIOD: f64 = 32.0;
 /// Cosine of half the phase between two points, rounded down.
 const ROUNDED: f64 = 0.99;
 /// Beats that are searched; the first is the largest but for the phase of the fast motion in it.
 const BEATS: f64 = 3.0;
 /// Decay times after which the start is forgotten, and most periods of the search.
 const FORGOTTEN: f64 = 12.0;
-const LONGEST: f64 = 20_000.0;
+const LONGEST_SEARCH: f64 = 20_000.0;
 
 /// The smallest G at which the primary mass, at rest until the drive is switched on, moves by the half-width of the cavity: for a base that
 /// begins as `sin(Omega tau)`, and for the phase of the base at the beginning that needs the least. Another phase
@@ -120,8 +120,8 @@ fn impacts_from_rest(epsilon: f64, lambda: f64, sigma: f64) -> [f64; 2] {
     };
     let end = (BEATS * TAU / (epsilon * sigma).abs())
         .min(FORGOTTEN / zeta)
-        .clamp(TAU, LONGEST * TAU);
-    let step = TAU / POINTS;
+        .clamp(TAU, LONGEST_SEARCH * TAU);
+    let step = TAU / POINTS_PER_PERIOD;
     let largest = |size: &dyn Fn(f64) -> f64| {
         let times = equally_spaced(0.0, end, (end / step) as usize + 2);
         let sizes: Vec<(f64, f64)> = times.map(|t| (t, size(t))).collect();

@@ -48,7 +48,7 @@ pub fn reading(scene: &Dimensionless, b: f64) -> f64 {
 }
 
 /// Rounds of a fixed-point iteration.
-const ROUNDS: usize = 12;
+const MOST_ITERATIONS: usize = 12;
 
 struct Reading<'a> {
     scene: &'a Dimensionless,
@@ -91,7 +91,7 @@ impl<'a> Reading<'a> {
     fn speed_at_level(&self, c: f64) -> Option<f64> {
         let mut amplitude = c;
         // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
-        for _ in 0..ROUNDS {
+        for _ in 0..MOST_ITERATIONS {
             let b = self.flow.manifold.b(amplitude, BranchSide::Right)?;
             amplitude = c / self.seen(b).norm();
         }

@@ -65,9 +65,9 @@ impl Override {
             return Err(self.error(format!("`{}` is not a section", self.section)));
         };
         // Amplitude of the drive: the key that is set replaces the others.
-        const KEYS: [&str; 3] = ["G", "E", "F"];
-        if self.section == "excitation" && KEYS.contains(&self.key.as_str()) {
-            KEYS.iter().for_each(|key| drop(section.remove(*key)));
+        const DRIVE_KEYS: [&str; 3] = ["G", "E", "F"];
+        if self.section == "excitation" && DRIVE_KEYS.contains(&self.key.as_str()) {
+            DRIVE_KEYS.iter().for_each(|key| drop(section.remove(*key)));
         }
         match (section.get_mut(&self.key), &self.value) {
             (Some(Value::Table(group)), Value::Table(set)) => group.extend(set.clone()),

@@ -143,12 +143,12 @@ impl Structure {
     /// Refuses a cavity where the mass ratio of the driven mode with a particle of the mass `m`, kg, is rounding.
     pub(super) fn reached_by(&self, m: f64) -> Result<(), String> {
         let (mode, ratio) = (self.mode(), self.mass_ratio(self.mode(), m));
-        if ratio > ROUNDING {
+        if ratio > FILE_ROUNDING {
             return Ok(());
         }
         Err(format!(
             "the cavity at {} is at a node of the driven mode {} by rising frequency ({:.6} Hz): its shape there, {:.4e} 1/sqrt(kg), makes the mass ratio \
-             m phi² = {ratio:.1e}, and above {ROUNDING:e} a particle can act on it; choose another point or mode, or check the unit of the shape",
+             m phi² = {ratio:.1e}, and above {FILE_ROUNDING:e} a particle can act on it; choose another point or mode, or check the unit of the shape",
             self.points[self.cavity],
             self.driven + 1,
             mode.omega / TAU,
@@ -370,7 +370,7 @@ impl Parts {
         let is_modal = damping
             .iter()
             .enumerate()
-            .all(|(n, value)| n % (modes.len() + 1) == 0 || value.abs() <= ROUNDING * largest);
+            .all(|(n, value)| n % (modes.len() + 1) == 0 || value.abs() <= FILE_ROUNDING * largest);
         Ok(Self { points, modes, coupled: (!is_modal).then_some(coupled) })
     }
 
@@ -410,7 +410,7 @@ impl Parts {
 }
 
 /// Largest relative difference of a matrix from its transpose, and share of a shape at a node: rounding of what a file states to nine digits.
-const ROUNDING: f64 = 1e-9;
+const FILE_ROUNDING: f64 = 1e-9;
 /// Largest difference of the norm of a mass-normalised shape from 1: shapes are measured, or written to three digits.
 const NORM: f64 = 0.02;
 
@@ -755,7 +755,7 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
         .shape
         .iter()
         .fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let is_node = |point: usize| mode.shape[point].abs() <= ROUNDING * largest;
+    let is_node = |point: usize| mode.shape[point].abs() <= FILE_ROUNDING * largest;
     if is_node(at.cavity) {
         return Err(format!(
             "the cavity at {} is at a node of the driven mode {number}, whose shape there is {:e} of its largest: no impact can drive it; choose another \

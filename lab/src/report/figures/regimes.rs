@@ -100,15 +100,15 @@ fn stripes(map: &Map, regime: Regime) -> Vec<Place> {
 }
 
 /// Parts of the map across, in each direction, in which the border of the theory's island is searched for.
-const PARTS: usize = 100;
+const BORDER_PARTS: usize = 100;
 
 /// The border of the region where first-order theory has a stable symmetric 1:1 motion, by marching squares: pairs of ends.
 fn outline(map: &Map) -> Vec<Place> {
-    let along = |axis: &Axis, n: usize| axis.from + (axis.to - axis.from) * n as f64 / PARTS as f64;
+    let along = |axis: &Axis, n: usize| axis.from + (axis.to - axis.from) * n as f64 / BORDER_PARTS as f64;
     let place = |column: usize, row: usize| (along(&map.x, column), along(&map.y, row));
     let inside = |(x, y): Place| map.theory_stable(x, y);
-    let corners: Vec<Vec<bool>> = (0..=PARTS)
-        .map(|row| (0..=PARTS).map(|column| inside(place(column, row))).collect())
+    let corners: Vec<Vec<bool>> = (0..=BORDER_PARTS)
+        .map(|row| (0..=BORDER_PARTS).map(|column| inside(place(column, row))).collect())
         .collect();
     let border = |(from, from_inside): (Place, bool), (to, _): (Place, bool)| {
         let at = |part: f64| (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
@@ -116,7 +116,7 @@ fn outline(map: &Map) -> Vec<Place> {
         at(end)
     };
     let mut segments = Vec::new();
-    for (row, column) in (0..PARTS).flat_map(|row| (0..PARTS).map(move |column| (row, column))) {
+    for (row, column) in (0..BORDER_PARTS).flat_map(|row| (0..BORDER_PARTS).map(move |column| (row, column))) {
         // The corners in turn, each with whether it is inside.
         let around = [(0, 0), (1, 0), (1, 1), (0, 1)]
             .map(|(dx, dy)| (place(column + dx, row + dy), corners[row + dy][column + dx]));

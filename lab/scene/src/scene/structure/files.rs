@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, SymmetricEigen};
 use num_complex::Complex64;
 
-use super::ROUNDING;
+use super::FILE_ROUNDING;
 use crate::scene::table::{Channel, Contents, plain_table};
 
 /// The columns of the plain table under `key`: numbers under the names of points.
@@ -91,7 +91,7 @@ impl Matrix {
                 }
             }
         }
-        if worst <= ROUNDING * largest {
+        if worst <= FILE_ROUNDING * largest {
             return Ok(());
         }
         let (row, column) = place;
@@ -99,7 +99,7 @@ impl Matrix {
         let [below, above] = [self.values[(row, column)], self.values[(column, row)]];
         Err(format!(
             "{} is not symmetric: its element ({first}, {second}) is {below}, and ({second}, {first}) is {above}; they differ by {:.1e} of its largest \
-             element, and {ROUNDING:e} is allowed, which is rounding: write it with ten digits, or with the mean of both in both places",
+             element, and {FILE_ROUNDING:e} is allowed, which is rounding: write it with ten digits, or with the mean of both in both places",
             self.title(),
             worst / largest
         ))
@@ -126,7 +126,7 @@ impl Matrix {
         let what = if may_be_singular { "semidefinite" } else { "definite" };
         let start =
             format!("{title} is not positive {what}: eigenvalue 1 of {count}, the smallest, is {smallest:.4e} {unit}");
-        if smallest < -ROUNDING * largest {
+        if smallest < -FILE_ROUNDING * largest {
             return Err(format!("{start}; check the signs of its elements"));
         }
         if may_be_singular || smallest > rounding {
@@ -283,7 +283,7 @@ impl Residues {
             .map(|(_, residue)| residue.map(|part| 2.0 * part.re).norm());
         // An impulse on masses moves nothing at once.
         let is_consistent = sum(|_| Complex64::ONE).norm() <= CANCELLED * sizes.sum::<f64>();
-        let is_real = |shape: &[Complex64]| shape.iter().all(|part| part.im.abs() <= ROUNDING * part.norm());
+        let is_real = |shape: &[Complex64]| shape.iter().all(|part| part.im.abs() <= FILE_ROUNDING * part.norm());
         if self.poles.len() != n || !is_consistent || self.poles.iter().all(|(_, shape)| is_real(shape)) {
             return None;
         }
