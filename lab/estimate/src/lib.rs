@@ -27,7 +27,7 @@ mod windows;
 
 pub use curve::{Backbone, Curve, Resonance};
 pub use fit::{Estimate, Hyper, Solution};
-pub use interpolation::CubicSpline;
+pub use interpolation::{Basis, CubicSpline};
 pub use linear::Linear;
 pub use periods::Periods;
 pub use record::{Element, Immediate, Path, Record};
