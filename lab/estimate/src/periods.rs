@@ -148,14 +148,15 @@ impl Periods {
             return None;
         }
         let mut periods = Self::default();
-        let mut fits = Vec::new();
+        let (mut fits, mut phases) = (Vec::new(), Vec::new());
         for span @ [i, j] in spans {
             let turn_per_sample = (turns[j] - turns[i]) / (j - i) as f64;
             fits.push(Fit::new(span, TAU * turn_per_sample)?);
+            phases.push(Complex64::cis(TAU * 0.5 * (turns[i] + turns[j - 1])));
             periods.omega.push(TAU * turn_per_sample / sample_time);
             periods.time.push((i as f64 + 0.5 * (j - i - 1) as f64) * sample_time);
         }
-        [periods.response, periods.linear] = [response, linear].map(|signal| periods.smooth(&fits, signal, omega));
+        [periods.response, periods.linear] = [response, linear].map(|signal| periods.smooth(&fits, &phases, signal, omega));
         let envelope = CubicSpline::new(periods.time.clone(), periods.response.clone());
         let mut rest = response.to_vec();
         for (k, value) in rest.iter_mut().enumerate().take(edges[edges.len() - 1]).skip(edges[0]) {
@@ -176,18 +177,18 @@ impl Periods {
         Some(periods)
     }
 
-    /// Fundamental of a signal, without what its drift leaves in it.
-    fn smooth(&self, fits: &[Fit], signal: &[f64], omega: f64) -> Vec<Complex64> {
-        let turn = |t: &f64| Complex64::cis(-omega * t);
-        let one = |(fit, t): (&Fit, &f64)| {
+    /// Fundamental of a signal, without what its drift leaves in it. Drift is that in the frame of the response, whose phases in the middles of the
+    /// periods are given: in a frame of constant frequency differences would miss a part of the detuning.
+    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], omega: f64) -> Vec<Complex64> {
+        let one = |(fit, phase): (&Fit, &Complex64)| {
             let coefficients = fit.of(signal).0;
-            Complex64::new(coefficients[1], coefficients[2]) * turn(t)
+            Complex64::new(coefficients[1], coefficients[2]) * phase.conj()
         };
-        let z: Vec<Complex64> = fits.iter().zip(&self.time).map(one).collect();
-        let slopes = gradient(&z, &self.time);
+        let z: Vec<Complex64> = fits.iter().zip(phases).map(one).collect();
+        let rates = gradient(&z, &self.time);
         let corrected = |k: usize| {
-            let rate = slopes[k] - Complex64::i() * (self.omega[k] - omega) * z[k];
-            z[k] + Complex64::i() * rate.conj() * turn(&self.time[k]).powi(2) / (2.0 * self.omega[k])
+            let own = z[k] * phases[k] + Complex64::i() * (rates[k] * phases[k]).conj() / (2.0 * self.omega[k]);
+            own * Complex64::cis(-omega * self.time[k])
         };
         (0..z.len()).map(corrected).collect()
     }
