@@ -197,6 +197,15 @@ impl Columns {
         columns
     }
 
+    /// Forgets the feedback of periods that do not count: nothing is known of their force, and at rest its phase has no meaning.
+    pub fn keep_feedback(&mut self, used: &[bool]) {
+        for k in 1..used.len() {
+            if !used[k - 1] || !used[k] {
+                self.feedback[k].fill(0.0);
+            }
+        }
+    }
+
     /// The increments from period `k` to the next one, and their derivatives by u at `k`.
     fn step(
         &mut self,
