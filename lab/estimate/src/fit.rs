@@ -17,9 +17,11 @@ const FUNCTIONS: usize = 23;
 const LAG: f64 = 0.02;
 /// Information on u at the start: none, but for rounding.
 const START: f64 = 1e-30;
+/// Uncertainty of the curvature of an element's own force, relative: what the uncertainties of a drawing move it by.
+const SHAPE: f64 = 0.25;
 /// Rounds of path, lag and variances.
 const ROUNDS: usize = 3;
-/// Limits of the three: 1 % to all of what is beyond the lag, as an amplitude; any curvature of S, unless its element has more; noise from half to
+/// Limits of the three: 1 % to all of what is beyond the lag, as an amplitude; any curvature of S; noise from half to
 /// four times the measured one, as an amplitude.
 const LIMITS: [[f64; 2]; 3] = [[1e-4, 1.0], [1e-5, 30.0], [0.2, 20.0]];
 
@@ -39,8 +41,10 @@ pub struct Estimate<'a> {
     /// Factor of the element's lag.
     pub lag: Complex64,
     hyper: Hyper,
-    /// Roughness of the element's own force, over the scale: that of S is not smaller.
-    roughness: f64,
+    /// Coefficients of the element's own force: S has its curvature, and deviates from it by a random walk.
+    own: Vec<Complex64>,
+    /// Smallest roughness of the deviation, over the scale.
+    least: f64,
     columns: Columns,
 }
 
@@ -53,7 +57,7 @@ pub struct Solution {
     /// The equations with the prior.
     normal: Cholesky<f64, Dyn>,
     /// The matrix without the prior, and the right-hand side, in which the lag has one.
-    information: [DMatrix<f64>; 2],
+    information: (DMatrix<f64>, DVector<f64>),
     /// Innovations that the unknowns leave, with variance 1.
     pub innovations: Vec<f64>,
 }
@@ -90,14 +94,16 @@ impl<'a> Estimate<'a> {
             .for_each(|(used, lost)| *used &= !lost);
         columns.keep_feedback(&used);
         let seconds = coefficients.windows(3).map(|c| (c[0] - 2.0 * c[1] + c[2]).norm_sqr());
-        let roughness = (seconds.sum::<f64>() / (FUNCTIONS - 2) as f64).sqrt() / scale;
+        let least = SHAPE * (seconds.sum::<f64>() / (FUNCTIONS - 2) as f64).sqrt() / scale;
+        let own = coefficients.clone();
         let enough = 2 * used.iter().filter(|used| **used).count() >= FUNCTIONS;
         let hyper = [0.03, 0.1, 1.0];
-        enough.then_some(Self { record, element, scale, used, basis, coefficients, lag, hyper, roughness, columns })
+        enough.then_some(Self { record, element, scale, used, basis, coefficients, lag, hyper, own, least, columns })
     }
 
-    /// The path as given, without the errors of it: for comparison.
+    /// The path as given, without the errors of it, and no curvature expected of the force: for comparison.
     pub fn with_given_path(mut self) -> Self {
+        self.own.fill(Complex64::ZERO);
         self.columns.feedback.iter_mut().for_each(|one| one.fill(0.0));
         self
     }
@@ -117,24 +123,16 @@ impl<'a> Estimate<'a> {
         let right = products.view((1, 0), (n, 1)).into_owned();
         let m = self.basis.size;
         let (mut normal, mut known) = (information.clone(), right.column(0).into_owned());
-        let roughness = 2.0 / (hyper[1] * self.scale).powi(2);
-        for second in 0..m - 2 {
-            for (i, a) in [1.0, -2.0, 1.0].iter().enumerate() {
-                for (j, b) in [1.0, -2.0, 1.0].iter().enumerate() {
-                    for part in 0..2 {
-                        normal[(2 * (second + i) + part, 2 * (second + j) + part)] += a * b * roughness;
-                    }
-                }
-            }
-        }
         for (part, change) in [1.0 - self.lag.re, -self.lag.im].into_iter().enumerate() {
             normal[(2 * m + part, 2 * m + part)] += LAG.powi(-2);
             known[2 * m + part] += change * LAG.powi(-2);
             normal[(2 * m + 2 + part, 2 * m + 2 + part)] += START;
         }
+        let right = known.clone();
+        let constant = self.expect(&mut normal, &mut known, hyper[1]);
         let normal = normal.cholesky()?;
         let unknowns = normal.solve(&known);
-        let deviance = filter.logarithms + products[(0, 0)] - known.dot(&unknowns)
+        let deviance = filter.logarithms + products[(0, 0)] + constant - known.dot(&unknowns)
             + normal.ln_determinant()
             + 4.0 * (m - 2) as f64 * hyper[1].ln();
         let innovations = white.row(0).transpose() - white.rows(1, n).tr_mul(&unknowns);
@@ -143,16 +141,38 @@ impl<'a> Estimate<'a> {
             deviance,
             unknowns,
             normal,
-            information: [information, DMatrix::from_column_slice(n, 1, known.as_slice())],
+            information: (information, right),
             innovations,
         })
+    }
+
+    /// Adds what is expected of the spline: second differences of its coefficients as those of the element's own force, with a variance. Returns the
+    /// constant term.
+    fn expect(&self, normal: &mut DMatrix<f64>, known: &mut DVector<f64>, roughness: f64) -> f64 {
+        // Half of the variance for each component.
+        let weight = 2.0 / (roughness * self.scale).powi(2);
+        let mut constant = 0.0;
+        for (first, own) in self.own.windows(3).enumerate() {
+            let second = own[0] - 2.0 * own[1] + own[2];
+            for (part, expected) in [second.re, second.im].into_iter().enumerate() {
+                let place = |i: usize| 2 * (first + i) + part;
+                for (i, a) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+                    for (j, b) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+                        normal[(place(i), place(j))] += a * b * weight;
+                    }
+                    known[place(i)] += a * expected * weight;
+                }
+                constant += expected * expected * weight;
+            }
+        }
+        constant
     }
 
     /// Maximum likelihood of the three variances; path and lag follow in between.
     pub fn fit(mut self) -> Option<(Self, Solution)> {
         for round in 0..ROUNDS {
             let mut limits = LIMITS;
-            limits[1][0] = limits[1][0].max(self.roughness);
+            limits[1][0] = limits[1][0].max(self.least);
             let inside = |p: &[f64; 3]| -> Hyper { std::array::from_fn(|i| p[i].exp().clamp(limits[i][0], limits[i][1])) };
             let outside = |p: &[f64; 3]| -> f64 { p.iter().zip(inside(p)).map(|(p, q)| (p - q.ln()).powi(2)).sum() };
             let cost = |p: &[f64; 3]| {
@@ -219,7 +239,7 @@ impl Solution {
     /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, and their values: the equations, without the
     /// other unknowns.
     fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let [all, right] = &self.information;
+        let (all, right) = &self.information;
         let rest = all.nrows() - n;
         // The others keep their prior, which the equations with it contain.
         let lower = self.normal.l();
@@ -227,8 +247,7 @@ impl Solution {
         let inverse = with_prior.cholesky()?;
         let cross = all.view((n, 0), (rest, n)).into_owned();
         let matrix = all.view((0, 0), (n, n)) - cross.tr_mul(&inverse.solve(&cross));
-        let prior = DVector::from_fn(n + rest, |i, _| right[i]);
-        let known = prior.rows(0, n) - cross.tr_mul(&inverse.solve(&prior.rows(n, rest).into_owned()));
+        let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&right.rows(n, rest).into_owned()));
         let eigen = matrix.symmetric_eigen();
         let largest = eigen.eigenvalues.max();
         let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > ROUNDING * largest).collect();
