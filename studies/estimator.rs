@@ -126,7 +126,7 @@ fn cubic([[x0, v0], [x1, v1]]: [[f64; 2]; 2], h: f64) -> Drive {
 /// Records a rig: once in a period the loops change frequency and amplitude of the base.
 fn recorded(rig: &Rig, kind: &str, snr: f64) -> Result<Recorded, Failure> {
     let Numbers { f0, zeta, r, b, epsilon } = rig.truth;
-    let (omega0, h) = (TAU * f0, 1.0 / (f0 * std::env::var("SPP").map_or(SAMPLES, |s| s.parse().unwrap())));
+    let (omega0, h) = (TAU * f0, 1.0 / (f0 * SAMPLES));
     let parameters = Parameters {
         primary_mass: 1.0,
         stiffness: omega0 * omega0,
@@ -266,10 +266,6 @@ fn judged(rig: &Rig, recorded: &Recorded) -> Option<Judged> {
         if found.converged { "" } else { " (not converged)" },
         found.lag,
     );
-    if std::env::var("DBG").is_ok() { let exact = rig.truth.backbone(Sensor::Q1); let sp=CubicSpline::new(exact.iter().map(|p| p[0].ln()).collect(), exact.iter().map(|p| num_complex::Complex64::new(p[1],p[2])).collect());
-       let e=found.curve.basis.ends; let a: Vec<f64>=(0..25).map(|n| (e[0]+(e[1]-e[0])*f64::from(n)/24.0).exp()).collect(); let m=found.curve.at(&a); let eb=rig.truth.epsilon*rig.truth.b; let ew=TAU*rig.truth.f0*rig.truth.epsilon;
-       for n in (0..25).step_by(2) { let x=sp.at(a[n].ln())[0]; println!("   C {:.3} G {:.3} dE {:+.1e} u {:.1e}  dsig {:+.1e} u {:.1e}", a[n]/rig.truth.b, x.re/eb, (m.drive[n]-x.re)/eb, m.covariance[(n,n)].sqrt()/eb, (m.omega[n]-x.im)/ew, m.covariance[(25+n,25+n)].sqrt()/ew); }
-       let nis: f64 = found.innovations.iter().map(|e| e*e).sum::<f64>()/found.innovations.len() as f64; println!("   nis {nis:.3} {:?}", found.scene); }
     let u = [u_drive, u_sigma, found.uncertainty[2] / found.scene.r];
     Some(Judged { curve, parameters, u, rejected: found.p() < 0.01, periods })
 }
@@ -289,7 +285,6 @@ fn main() -> Result<(), Failure> {
     let [kind, count, seed, snr] = &arguments(["levels|sweep|decay|mix", "RIGS", "SEED", "SNR"])?;
     let mut uniform = uniform(seed.parse()?);
     let rigs: Vec<Rig> = (0..count.parse()?).map(|n| drawn(&mut uniform, n)).collect();
-    let rigs: Vec<Rig> = rigs.into_iter().filter(|r| std::env::var("ONLY").is_err() || format!("{:.3e}", r.seed as f64).starts_with(&std::env::var("ONLY").unwrap())).collect();
     let noise: f64 = snr.parse()?;
     let one = |rig: &Rig| -> Result<_, Failure> {
         let recorded = recorded(rig, kind, noise)?;

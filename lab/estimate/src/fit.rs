@@ -98,7 +98,19 @@ impl<'a> Estimate<'a> {
         let own = coefficients.clone();
         let enough = 2 * used.iter().filter(|used| **used).count() >= FUNCTIONS;
         let hyper = [0.03, 0.1, 1.0];
-        enough.then_some(Self { record, element, scale, used, basis, coefficients, lag, hyper, own, least, columns })
+        enough.then_some(Self {
+            record,
+            element,
+            scale,
+            used,
+            basis,
+            coefficients,
+            lag,
+            hyper,
+            own,
+            least,
+            columns,
+        })
     }
 
     /// The path as given, without the errors of it, and no curvature expected of the force: for comparison.
@@ -173,7 +185,8 @@ impl<'a> Estimate<'a> {
         for round in 0..ROUNDS {
             let mut limits = LIMITS;
             limits[1][0] = limits[1][0].max(self.least);
-            let inside = |p: &[f64; 3]| -> Hyper { std::array::from_fn(|i| p[i].exp().clamp(limits[i][0], limits[i][1])) };
+            let inside =
+                |p: &[f64; 3]| -> Hyper { std::array::from_fn(|i| p[i].exp().clamp(limits[i][0], limits[i][1])) };
             let outside = |p: &[f64; 3]| -> f64 { p.iter().zip(inside(p)).map(|(p, q)| (p - q.ln()).powi(2)).sum() };
             let cost = |p: &[f64; 3]| {
                 self.solve(inside(p))

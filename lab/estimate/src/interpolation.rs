@@ -158,6 +158,16 @@ pub fn gradient(y: &[Complex64], x: &[f64]) -> Vec<Complex64> {
     (0..n).map(at).collect()
 }
 
+/// Second derivatives of values at rising `x` by second differences, at the ends those next to them.
+pub fn curvature(y: &[Complex64], x: &[f64]) -> Vec<Complex64> {
+    let rise = |i: usize| (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+    let at = |i: usize| {
+        let i = i.clamp(1, x.len() - 2);
+        (rise(i) - rise(i - 1)) * (2.0 / (x[i + 1] - x[i - 1]))
+    };
+    (0..x.len()).map(at).collect()
+}
+
 /// Continuous angles, from those between -pi and pi.
 pub fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut before = None;
