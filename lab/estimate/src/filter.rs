@@ -1,0 +1,156 @@
+//! The Kalman filter that whitens a record, period by period, and its backward pass.
+//!
+//! The state is u, two real numbers. With the unknowns as further columns the filter is that of de Jong (The diffuse Kalman filter, Annals of
+//! Statistics 19, 1991): one pass whitens the record and a unit of each unknown.
+
+use nalgebra::{DMatrix, Matrix2, Vector2};
+use num_complex::Complex64;
+
+use crate::columns::Columns;
+use crate::record::Record;
+
+/// What the filter does at a period.
+struct Period {
+    transition: Matrix2<f64>,
+    predicted: Matrix2<f64>,
+    corrected: Matrix2<f64>,
+    gain: Matrix2<f64>,
+    /// Makes the innovation one of covariance 1.
+    whitening: Matrix2<f64>,
+}
+
+/// Variances that a filter is made with.
+#[derive(Debug, Clone, Copy)]
+pub struct Variances {
+    /// Share of the force beyond its lag that is noise of the process, as a variance.
+    pub process: f64,
+    /// Variance of the noise of the response over the measured one.
+    pub measured: f64,
+}
+
+/// The filter of a record.
+pub struct Filter {
+    periods: Vec<Period>,
+    used: Vec<bool>,
+    /// Sum of the logarithms of the determinants of the innovations' covariances.
+    pub logarithms: f64,
+}
+
+/// Variance, over that of the noise, by which a period that is not used lets the state go: 1e4 standard deviations of it.
+const FORGET: f64 = 1e9;
+
+fn rotation(z: Complex64) -> Matrix2<f64> {
+    Matrix2::new(z.re, -z.im, z.im, z.re)
+}
+
+fn pair(z: Complex64) -> Vector2<f64> {
+    Vector2::new(z.re, z.im)
+}
+
+impl Filter {
+    /// Of a record whose periods are `used` or say nothing.
+    pub fn new(record: &Record, columns: &Columns, used: &[bool], variances: Variances) -> Self {
+        let (noise, base) = (&record.periods.noise, &record.periods.base_noise);
+        let mut covariance = Matrix2::zeros();
+        let mut logarithms = 0.0;
+        let mut period = |k: usize| {
+            let (mut transition, mut process) = (Matrix2::zeros(), 0.0);
+            if k > 0 {
+                let duration = record.steps[k - 1];
+                transition = rotation(record.transition(duration)) + columns.feedback[k];
+                let moved = (record.linear.gain() * duration).norm_sqr();
+                process = 0.5 * moved * (variances.process * columns.beyond[k - 1] + base[k] + base[k - 1]);
+            }
+            if !used[k] {
+                process += FORGET * noise[k];
+            }
+            let predicted = transition * covariance * transition.transpose() + Matrix2::from_diagonal_element(process);
+            let innovation = predicted + Matrix2::from_diagonal_element(variances.measured * noise[k]);
+            let (mut gain, mut whitening) = (Matrix2::zeros(), Matrix2::zeros());
+            if used[k] {
+                let lower = innovation.cholesky().map_or(Matrix2::zeros(), |one| one.l());
+                whitening = lower.try_inverse().unwrap_or_default();
+                gain = predicted * whitening.transpose() * whitening;
+                logarithms += 2.0 * lower.determinant().ln();
+            }
+            let corrected = predicted - gain * predicted;
+            covariance = 0.5 * (corrected + corrected.transpose());
+            Period {
+                transition,
+                predicted,
+                corrected: covariance,
+                gain,
+                whitening,
+            }
+        };
+        let periods = (0..used.len()).map(&mut period).collect();
+        Self { periods, used: used.to_vec(), logarithms }
+    }
+
+    /// Whitened innovations, a row for each component of each used period: of the record, and of a unit of the real and of the imaginary part of
+    /// each unknown.
+    pub fn whiten(&self, record: &Record, columns: &Columns) -> DMatrix<f64> {
+        let unknowns = columns.direct[0].len() - 1;
+        let rows = 2 * self.used.iter().filter(|used| **used).count();
+        let mut state = vec![Vector2::zeros(); 1 + 2 * unknowns];
+        let mut white = DMatrix::zeros(1 + 2 * unknowns, rows);
+        let mut row = 0;
+        for (k, period) in self.periods.iter().enumerate() {
+            let known = pair(columns.increments[k][0]) - columns.feedback[k] * pair(columns.path[k.saturating_sub(1)]);
+            let of_record = [known, pair(columns.direct[k][0] - record.departure[k])];
+            for (n, x) in state.iter_mut().enumerate() {
+                let (unknown, is_imaginary) = (n.div_ceil(2), n > 0 && n % 2 == 0);
+                let [increment, direct] = match (n, is_imaginary) {
+                    (0, _) => of_record,
+                    (_, false) => [&columns.increments, &columns.direct].map(|of| pair(of[k][unknown])),
+                    (_, true) => [&columns.increments, &columns.direct].map(|of| pair(Complex64::i() * of[k][unknown])),
+                };
+                *x = period.transition * *x + increment;
+                if self.used[k] {
+                    let innovation = direct + *x;
+                    white
+                        .fixed_view_mut::<1, 2>(n, row)
+                        .copy_from(&(period.whitening * innovation).transpose());
+                    *x -= period.gain * innovation;
+                }
+            }
+            row += if self.used[k] { 2 } else { 0 };
+        }
+        white.row_mut(0).neg_mut();
+        white
+    }
+
+    /// The response of each period that these unknowns explain best: the backward pass. As measured where a period is not used.
+    pub fn smooth(&self, record: &Record, columns: &Columns, unknowns: &[Complex64]) -> Vec<Complex64> {
+        let sum = |row: &[Complex64]| -> Complex64 {
+            row[0] + row[1..].iter().zip(unknowns).map(|(a, b)| a * b).sum::<Complex64>()
+        };
+        let direct: Vec<Complex64> = columns.direct.iter().map(|row| sum(row)).collect();
+        let mut state = Vector2::zeros();
+        let mut states = Vec::new();
+        for (k, period) in self.periods.iter().enumerate() {
+            let known =
+                pair(sum(&columns.increments[k])) - columns.feedback[k] * pair(columns.path[k.saturating_sub(1)]);
+            let predicted = period.transition * state + known;
+            state = predicted - period.gain * (pair(direct[k] - record.departure[k]) + predicted);
+            states.push([predicted, state]);
+        }
+        let mut smooth = state;
+        let mut response = record.periods.response.clone();
+        for k in (0..states.len()).rev() {
+            if k + 1 < states.len() {
+                let next = &self.periods[k + 1];
+                let back = self.periods[k].corrected * next.transition.transpose();
+                let back = next
+                    .predicted
+                    .try_inverse()
+                    .map_or(Matrix2::zeros(), |inverse| back * inverse);
+                smooth = states[k][1] + back * (smooth - states[k + 1][0]);
+            }
+            if self.used[k] {
+                response[k] = record.periods.linear[k] + Complex64::new(smooth[0], smooth[1]) + direct[k];
+            }
+        }
+        response
+    }
+}

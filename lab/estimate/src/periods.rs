@@ -1,0 +1,201 @@
+//! The fundamental of a record, period by period.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use num_complex::Complex64;
+
+use crate::interpolation::{CubicSpline, curvature, gradient, unwrapped};
+
+/// What the periods of a record say. A complex amplitude z at the time t is the motion `Im(z exp(i omega t))`, with the frequency of the frame.
+#[derive(Debug, Clone, Default)]
+pub struct Periods {
+    /// Time of the middle of each period, s.
+    pub time: Vec<f64>,
+    /// Fundamental of the response.
+    pub response: Vec<Complex64>,
+    /// Fundamental of the linear response.
+    pub linear: Vec<Complex64>,
+    /// Variance of a component of the fundamental of the response by noise.
+    pub noise: Vec<f64>,
+    /// Variance of a component of the fundamental of the base by noise.
+    pub base_noise: Vec<f64>,
+    /// Frequency, rad/s.
+    pub omega: Vec<f64>,
+    /// Second harmonic of what the smooth fundamental leaves: phase as at the middle of the period.
+    pub second: Vec<Complex64>,
+}
+
+/// Most harmonics that a period's fit contains, and the samples that each of them needs.
+const HARMONICS: usize = 15;
+const SAMPLES: usize = 5;
+
+/// The least-squares fit of harmonics to a period.
+struct Fit {
+    begin: usize,
+    matrix: DMatrix<f64>,
+    factors: Cholesky<f64, Dyn>,
+}
+
+impl Fit {
+    /// For the samples from `begin` to `end` at the frequency `omega`.
+    fn new([begin, end]: [usize; 2], step: f64) -> Option<Self> {
+        let n = end - begin;
+        let middle = 0.5 * (n - 1) as f64;
+        let terms = 1 + 2 * HARMONICS.min(n / SAMPLES);
+        let mut matrix = DMatrix::zeros(n, terms);
+        for row in 0..n {
+            let turn = Complex64::cis((row as f64 - middle) * step);
+            let mut harmonic = Complex64::ONE;
+            matrix[(row, 0)] = 1.0;
+            for order in 1..=terms / 2 {
+                harmonic *= turn;
+                matrix[(row, 2 * order - 1)] = harmonic.im;
+                matrix[(row, 2 * order)] = harmonic.re;
+            }
+        }
+        let factors = matrix.tr_mul(&matrix).cholesky()?;
+        Some(Self { begin, matrix, factors })
+    }
+
+    /// Coefficients, and the variance of a component by what they leave.
+    fn of(&self, signal: &[f64]) -> (DVector<f64>, f64) {
+        let n = self.matrix.nrows();
+        let values = DVector::from_column_slice(&signal[self.begin..self.begin + n]);
+        let coefficients = self.factors.solve(&self.matrix.tr_mul(&values));
+        let rest = (values - &self.matrix * &coefficients).norm_squared();
+        let free = (n - self.matrix.ncols()) as f64;
+        (coefficients, rest / free * 2.0 / n as f64)
+    }
+
+    /// Variance of a component by white noise, from the median of the sixth differences: impulses are not noise.
+    fn white(&self, signal: &[f64]) -> f64 {
+        let n = self.matrix.nrows();
+        let sixth = |v: &[f64]| (20.0 * v[3] - 15.0 * (v[2] + v[4]) + 6.0 * (v[1] + v[5]) - (v[0] + v[6])).abs();
+        let mut sizes: Vec<f64> = signal[self.begin..self.begin + n].windows(7).map(sixth).collect();
+        sizes.sort_by(f64::total_cmp);
+        let m = sizes.len();
+        let median = 0.5 * (sizes[(m - 1) / 2] + sizes[m / 2]);
+        // Median of the size of a normal variable; sum of the squares of the factors.
+        (median / 0.6745).powi(2) / 924.0 * 2.0 / n as f64
+    }
+}
+
+/// Moving average over `width` values, zero beyond the ends.
+fn average(values: &[Complex64], width: usize) -> Vec<Complex64> {
+    let mut sums = vec![Complex64::ZERO];
+    for value in values {
+        sums.push(sums[sums.len() - 1] + value);
+    }
+    let ahead = (width - 1) / 2 + 1;
+    let mean = |k: usize| {
+        let [from, to] = [(k + ahead).saturating_sub(width), (k + ahead).min(values.len())];
+        (sums[to] - sums[from]) / width as f64
+    };
+    (0..values.len()).map(mean).collect()
+}
+
+/// Turns of the response at each sample, from its fundamental, averaged three times over a period.
+fn turns(response: &[f64], step: f64) -> Vec<f64> {
+    let width = (TAU / step).round() as usize;
+    let mut envelope: Vec<Complex64> = (0..)
+        .zip(response)
+        .map(|(k, y)| Complex64::cis(-step * f64::from(k)) * y)
+        .collect();
+    for _ in 0..3 {
+        envelope = average(&envelope, width);
+    }
+    let angles = unwrapped(envelope.iter().map(|value| value.arg()));
+    (0..)
+        .zip(angles)
+        .map(|(k, angle)| (angle + step * f64::from(k)) / TAU)
+        .collect()
+}
+
+/// First samples of whole turns; the record ends where the response has lost its phase, which then takes less than half a period or more than two.
+fn edges(turns: &[f64], width: usize) -> Vec<usize> {
+    let (first, last) = (turns[width].ceil() as i64, turns[turns.len() - width].floor() as i64);
+    let mut edges: Vec<usize> = Vec::new();
+    for turn in first..=last {
+        let edge = turns.partition_point(|one| *one < turn as f64);
+        if edges
+            .last()
+            .is_some_and(|before| !(before + width / 2..before + 2 * width).contains(&edge))
+        {
+            break;
+        }
+        edges.push(edge);
+    }
+    edges
+}
+
+impl Periods {
+    /// The periods of a response, with its linear part and the base, in the frame of the frequency `omega`, rad/s. `None` for fewer than 12.
+    ///
+    /// A fit to one period finds the Fourier coefficient of a varying amplitude w, `w - i conj(w')/(2 omega) + (pi²/6 w'' - conj(w'')/4)/omega²`. What is
+    /// beside w is taken off: of a decay by a tenth in a period it is 1e-2 and 4e-4 of w. Noise and second harmonic are
+    /// those of what the smooth fundamental leaves: growth inside a period would inflate them.
+    pub fn new([response, linear, base]: [&[f64]; 3], sample_time: f64, omega: f64) -> Option<Self> {
+        let step = omega * sample_time;
+        let width = (TAU / step).round() as usize;
+        // Twelve periods, and one at each end.
+        if response.len() < 14 * width || width < 2 * SAMPLES {
+            return None;
+        }
+        let turns = turns(response, step);
+        let edges = edges(&turns, width);
+        let spans: Vec<[usize; 2]> = edges.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        if spans.len() < 12 {
+            return None;
+        }
+        let mut periods = Self::default();
+        let (mut fits, mut phases) = (Vec::new(), Vec::new());
+        for span @ [i, j] in spans {
+            let turn_per_sample = (turns[j] - turns[i]) / (j - i) as f64;
+            fits.push(Fit::new(span, TAU * turn_per_sample)?);
+            phases.push(Complex64::cis(TAU * 0.5 * (turns[i] + turns[j - 1])));
+            periods.omega.push(TAU * turn_per_sample / sample_time);
+            periods.time.push((i as f64 + 0.5 * (j - i - 1) as f64) * sample_time);
+        }
+        [periods.response, periods.linear] =
+            [response, linear].map(|signal| periods.smooth(&fits, &phases, signal, omega));
+        let envelope = CubicSpline::new(periods.time.clone(), periods.response.clone());
+        let mut rest = response.to_vec();
+        for (k, value) in rest.iter_mut().enumerate().take(edges[edges.len() - 1]).skip(edges[0]) {
+            let t = k as f64 * sample_time;
+            *value -= (envelope.at(t)[0] * Complex64::cis(omega * t)).im;
+        }
+        for fit in &fits {
+            let (coefficients, noise) = fit.of(&rest);
+            let second = if coefficients.len() > 4 {
+                Complex64::new(coefficients[3], coefficients[4])
+            } else {
+                Complex64::ZERO
+            };
+            periods.second.push(second);
+            periods.noise.push(noise.min(fit.white(response)));
+            periods.base_noise.push(fit.white(base));
+        }
+        Some(periods)
+    }
+
+    /// Fundamental of a signal, without what its drift leaves in it. Drift is that in the frame of the response, whose phases in the middles of the
+    /// periods are given: in a frame of constant frequency differences would miss a part of the detuning.
+    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], omega: f64) -> Vec<Complex64> {
+        let one = |(fit, phase): (&Fit, &Complex64)| {
+            let coefficients = fit.of(signal).0;
+            Complex64::new(coefficients[1], coefficients[2]) * phase.conj()
+        };
+        let z: Vec<Complex64> = fits.iter().zip(phases).map(one).collect();
+        let rates = gradient(&z, &self.time);
+        let curvatures = curvature(&z, &self.time);
+        let corrected = |k: usize| {
+            let omega_k = self.omega[k];
+            let [rate, curvature] = [rates[k], curvatures[k]].map(|one| one * phases[k]);
+            let own = z[k] * phases[k] + Complex64::i() * rate.conj() / (2.0 * omega_k)
+                - (curvature * (PI * PI / 6.0) - curvature.conj() / 4.0) / (omega_k * omega_k);
+            own * Complex64::cis(-omega * self.time[k])
+        };
+        (0..z.len()).map(corrected).collect()
+    }
+}

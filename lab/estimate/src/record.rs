@@ -1,0 +1,150 @@
+//! A record, as the envelope of what the linear response leaves.
+
+use num_complex::Complex64;
+
+use crate::interpolation::{CubicSpline, unwrapped};
+use crate::linear::Linear;
+use crate::periods::Periods;
+
+/// The force of what is not linear, by the amplitude of the response. Forces are displacements of the base, m, relative to the phase of the response.
+pub trait Element {
+    /// Force in the steady motion of this amplitude; where the motion does not exist, that of the nearest.
+    fn steady(&self, amplitude: f64) -> Complex64;
+
+    /// Lag of the force behind the amplitude, in periods: `lag d' + d = steady force`. Zero: the force follows at once.
+    fn lag(&self, amplitude: f64) -> Complex64;
+
+    /// Whether the force at this amplitude is a smooth function of it, that follows it with one lag.
+    fn is_smooth(&self, amplitude: f64) -> bool;
+
+    /// Times and forces of the motion itself, in stretches, where it is known beyond the first order of its lag.
+    fn along(&self, path: &Path) -> Option<Vec<Vec<(f64, Complex64)>>>;
+}
+
+/// An element whose force follows at once, and of which nothing else is known.
+#[derive(Debug, Clone, Copy)]
+pub struct Immediate;
+
+impl Element for Immediate {
+    fn steady(&self, _: f64) -> Complex64 {
+        Complex64::ZERO
+    }
+
+    fn lag(&self, _: f64) -> Complex64 {
+        Complex64::ZERO
+    }
+
+    fn is_smooth(&self, _: f64) -> bool {
+        true
+    }
+
+    fn along(&self, _: &Path) -> Option<Vec<Vec<(f64, Complex64)>>> {
+        None
+    }
+}
+
+/// The response as a path: the logarithm of its complex amplitude over the time.
+pub struct Path {
+    spline: CubicSpline,
+    /// Frequency of the frame, rad/s.
+    pub omega0: f64,
+    /// Times between which the path is known, s.
+    pub ends: [f64; 2],
+}
+
+impl Path {
+    /// Through these amplitudes.
+    pub fn new(time: &[f64], amplitudes: &[Complex64], omega0: f64) -> Self {
+        let phases = unwrapped(amplitudes.iter().map(|z| z.arg()));
+        let logarithms = amplitudes.iter().zip(phases);
+        let logarithms = logarithms
+            .map(|(z, phase)| Complex64::new(z.norm().ln(), phase))
+            .collect();
+        Self {
+            spline: CubicSpline::new(time.to_vec(), logarithms),
+            omega0,
+            ends: [time[0], time[time.len() - 1]],
+        }
+    }
+
+    /// The logarithm, and its derivative.
+    pub fn at(&self, t: f64) -> [Complex64; 2] {
+        self.spline.at(t)
+    }
+
+    /// The motion itself, `Im exp(ln z + i omega0 t)`, and its velocity.
+    pub fn motion(&self, t: f64) -> [f64; 2] {
+        let [logarithm, rate] = self.at(t);
+        let z = (logarithm + Complex64::new(0.0, self.omega0 * t)).exp();
+        [z.im, ((rate + Complex64::new(0.0, self.omega0)) * z).im]
+    }
+}
+
+/// A record of response and base, of displacements in metres, demodulated with a linear response.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// The linear response.
+    pub linear: Linear,
+    /// Power of the frequency, over omega0, by which the force on this response grows: 2 for an impulse on the mass whose displacement is measured, 0
+    /// for the displacement of a particle in the sum of both.
+    pub power: i32,
+    /// Its periods; variances are averages over [`AVERAGED`] of them.
+    pub periods: Periods,
+    /// Response without its linear part.
+    pub departure: Vec<Complex64>,
+    /// From the middle of each period to that of the next one, s.
+    pub steps: Vec<f64>,
+}
+
+/// Periods over which the variance of noise is averaged: a hundred degrees of freedom each, so that its own error of 3 % does not count.
+const AVERAGED: usize = 21;
+
+/// Average over [`AVERAGED`] values, mirrored at the ends.
+fn averaged(values: &[f64]) -> Vec<f64> {
+    let (half, last) = (AVERAGED as isize / 2, values.len() as isize - 1);
+    let at = |k: isize| {
+        values[(if k < 0 {
+            -k
+        } else if k > last {
+            2 * last - k
+        } else {
+            k
+        }) as usize]
+    };
+    (0..=last)
+        .map(|k| (k - half..=k + half).map(at).sum::<f64>() / AVERAGED as f64)
+        .collect()
+}
+
+impl Record {
+    /// Demodulates equally spaced samples. `None` for fewer than twelve periods, or fewer than ten samples in a period.
+    pub fn new([response, base]: [&[f64]; 2], sample_time: f64, linear: Linear, power: i32) -> Option<Self> {
+        let mean = base.iter().sum::<f64>() / base.len() as f64;
+        let moving: Vec<f64> = base.iter().map(|x| x - mean).collect();
+        let mut periods = Periods::new(
+            [response, &linear.response(&moving, sample_time), base],
+            sample_time,
+            linear.omega0,
+        )?;
+        for (l, omega) in periods.linear.iter_mut().zip(&periods.omega) {
+            // Straight lines between the samples of a sine have less of its frequency.
+            let half = 0.5 * omega * sample_time;
+            *l /= (half.sin() / half).powi(2);
+        }
+        periods.noise = averaged(&periods.noise);
+        periods.base_noise = averaged(&periods.base_noise);
+        let departure = periods
+            .response
+            .iter()
+            .zip(&periods.linear)
+            .map(|(z, l)| z - l)
+            .collect();
+        let steps = periods.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        Some(Self { linear, power, periods, departure, steps })
+    }
+
+    /// The free motion of the envelope over a time, in the frame of omega0.
+    pub fn transition(&self, duration: f64) -> Complex64 {
+        ((self.linear.pole() - Complex64::new(0.0, self.linear.omega0)) * duration).exp()
+    }
+}

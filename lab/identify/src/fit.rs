@@ -1,0 +1,207 @@
+//! Parameters of an ideal cavity from a record: regimes, curve and fit in turn, until the linear response stays.
+
+use nalgebra::SVector;
+use num_complex::Complex64;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use vines_estimate::{Curve, Estimate, Record, Window};
+use vines_model::Sensor;
+use vines_model::numerics::{LeastSquares, Misfit};
+
+use crate::particle::Particle;
+use crate::regime::{Expected, TOLERANCES, one_to_one, rough_scene};
+use crate::scene::Scene;
+
+/// The response is sampled at equal times, s, together with the base.
+#[derive(Debug, Clone, Copy)]
+pub struct Samples<'a> {
+    /// Displacement of the response, m.
+    pub response: &'a [f64],
+    /// Displacement of the base, m.
+    pub base: &'a [f64],
+    /// Time between samples, s.
+    pub sample_time: f64,
+    /// What the response is.
+    pub sensor: Sensor,
+}
+
+/// What a record says of an ideal cavity.
+#[derive(Debug, Clone)]
+pub struct Identified {
+    /// The parameters.
+    pub scene: Scene,
+    /// Their standard uncertainties.
+    pub uncertainty: [f64; 5],
+    /// Drive and frequency of phase resonance, without the model of a cavity.
+    pub curve: Curve,
+    /// Sum of squares of what the record contradicts, and its degrees of freedom.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+    /// The periods that were used.
+    pub used: Vec<bool>,
+    /// Times of the middles of all periods, s.
+    pub time: Vec<f64>,
+    /// The windows and their most probable motions.
+    pub motions: Vec<(Window, usize)>,
+    /// Factor of the particle's lag: 1 if its closed form holds.
+    pub lag: Complex64,
+    /// Innovations, of variance 1 if the model holds.
+    pub innovations: Vec<f64>,
+    /// Passes, and whether the linear response stayed.
+    pub passes: usize,
+    /// Whether the linear response stayed.
+    pub converged: bool,
+}
+
+impl Identified {
+    /// Probability that noise contradicts an ideal cavity as much.
+    pub fn p(&self) -> f64 {
+        ChiSquared::new(self.degrees as f64).map_or(f64::NAN, |one| one.sf(self.chi_square))
+    }
+}
+
+/// Most passes.
+const PASSES: usize = 6;
+/// Change of f0 and zeta, in standard uncertainties, below which another pass changes nothing.
+const STILL: f64 = 0.1;
+/// Fewest periods: with fewer the curve is the prior's.
+const FEWEST: usize = 30;
+/// Gain of a further step, relative to one and chi-square, at which the minimum counts as found.
+const FOUND: f64 = 1e-6;
+/// Step of a derivative, relative: the truncation of a central difference is far below what a record resolves.
+const STEP: f64 = 1e-6;
+
+/// A least-squares model without traces.
+struct Model<F>(F);
+
+impl<const N: usize, F: Fn(&SVector<f64, N>) -> Option<Vec<f64>>> Misfit<N> for Model<F> {
+    type Trace = ();
+
+    fn residuals(&self, x: &SVector<f64, N>, (): &()) -> Option<(Vec<f64>, ())> {
+        Some(((self.0)(x)?, ()))
+    }
+
+    fn derivatives(&self, x: &SVector<f64, N>, (): &()) -> Option<Vec<SVector<f64, N>>> {
+        let mut columns = Vec::new();
+        for i in 0..N {
+            let [above, below] = [STEP, -STEP].map(|step| {
+                let mut moved = *x;
+                moved[i] += step;
+                (self.0)(&moved)
+            });
+            let (above, below) = (above?, below?);
+            columns.push(
+                above
+                    .iter()
+                    .zip(&below)
+                    .map(|(a, b)| (a - b) / (2.0 * STEP))
+                    .collect::<Vec<f64>>(),
+            );
+        }
+        let rows = columns.first().map_or(0, Vec::len);
+        Some((0..rows).map(|row| SVector::from_fn(|i, _| columns[i][row])).collect())
+    }
+}
+
+/// Parameters, uncertainties and chi-square of the cavity that fits the information of a curve, with the scene as a prior: without it a short noisy
+/// decay runs away.
+fn fit(curve: &Curve, sensor: Sensor, start: &Scene, prior: &Scene) -> Option<(Scene, [f64; 5], f64)> {
+    let expected = prior.unknowns();
+    let mut u = Scene::UNCERTAINTY;
+    u[2] /= prior.r * (1.0 - prior.r);
+    let residuals = |x: &SVector<f64, 5>| {
+        let mut residuals = curve.residuals(&Scene::of(x).backbone(sensor))?.as_slice().to_vec();
+        residuals.extend((0..5).map(|i| (x[i] - expected[i]) / u[i]));
+        residuals.iter().all(|one| one.is_finite()).then_some(residuals)
+    };
+    let best = LeastSquares::minimum(&Model(residuals), start.unknowns(), &(), FOUND)?;
+    let scene = Scene::of(&best.x);
+    let (covariance, slopes) = (best.covariance(), scene.slopes());
+    let uncertainty = std::array::from_fn(|i| covariance[(i, i)].sqrt() * slopes[i]);
+    Some((scene, uncertainty, best.chi_square))
+}
+
+/// Every so many points of a backbone count for the effective constants.
+const THIN: usize = 4;
+
+/// The particle whose closed form has the exact force of the scene: harmonics of the host change only its constants.
+fn effective(scene: &Scene, sensor: Sensor, power: i32) -> Option<Particle> {
+    let linear = scene.linear();
+    let backbone: Vec<[f64; 3]> = scene.backbone(sensor).into_iter().step_by(THIN).collect();
+    let particle = |x: &SVector<f64, 3>| {
+        let [epsilon, b, r] = x.map(f64::exp).into();
+        Particle { epsilon, b, r: r / (1.0 + r) }
+    };
+    let residuals = |x: &SVector<f64, 3>| {
+        let particle = particle(x);
+        let error = |point: &[f64; 3]| {
+            let error = particle.steady_motion(point[0]).force - linear.force_at_resonance(*point, power);
+            let error = error / (scene.epsilon * scene.b);
+            [error.re, error.im]
+        };
+        Some(backbone.iter().flat_map(error).collect())
+    };
+    let start = SVector::from([scene.epsilon, scene.b, scene.r / (1.0 - scene.r)].map(f64::ln));
+    LeastSquares::minimum(&Model(residuals), start, &(), FOUND).map(|best| particle(&best.x))
+}
+
+/// Power of the frequency by which the particle's force on a response grows.
+fn power(sensor: Sensor) -> i32 {
+    match sensor {
+        Sensor::V => 0,
+        Sensor::Q1 => 2,
+    }
+}
+
+impl Samples<'_> {
+    fn record(&self, scene: &Scene) -> Option<Record> {
+        Record::new(
+            [self.response, self.base],
+            self.sample_time,
+            scene.linear(),
+            power(self.sensor),
+        )
+    }
+}
+
+/// Regimes, curve and parameters, from samples and a rough scene. `None` without at least thirty periods of symmetric 1:1 motion.
+pub fn identify(samples: &Samples, rough: &Scene) -> Option<Identified> {
+    let mut scene = rough_scene(&samples.record(rough)?, rough);
+    for pass in 1..=PASSES {
+        let record = samples.record(&scene)?;
+        let particle = effective(&scene, samples.sensor, record.power)?;
+        let scale = scene.epsilon * scene.b;
+        let tolerance = TOLERANCES[usize::from(pass > 1)];
+        let expected = Expected { particle, host: Complex64::ZERO, tolerance, scale };
+        let (used, motions) = one_to_one(&record, &expected);
+        if used.iter().filter(|one| **one).count() < FEWEST {
+            return None;
+        }
+        let (estimate, solution) = Estimate::new(&record, &particle, scale, &used)?.fit()?;
+        let curve = estimate.curve(&solution)?;
+        let (fitted, uncertainty, chi_square) = fit(&curve, samples.sensor, &scene, rough)?;
+        let changes = [
+            (fitted.f0 - scene.f0) / uncertainty[0],
+            (fitted.zeta - scene.zeta) / uncertainty[1],
+        ];
+        let converged = changes.iter().all(|change| change.abs() < STILL);
+        scene = fitted;
+        if converged || pass == PASSES {
+            return Some(Identified {
+                scene,
+                uncertainty,
+                chi_square,
+                degrees: curve.expected.len(),
+                curve,
+                used: estimate.used.clone(),
+                time: record.periods.time.clone(),
+                motions,
+                lag: estimate.lag,
+                innovations: solution.innovations,
+                passes: pass,
+                converged,
+            });
+        }
+    }
+    None
+}

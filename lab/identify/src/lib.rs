@@ -1,0 +1,16 @@
+//! Parameters of a vibro-impact cavity from a record.
+//!
+//! The curve of phase resonance is that of [`vines_estimate`], with the particle's own force, lag and map; which periods it is of follows from the
+//! likelihoods of four motions. The ideal cavity is then fitted to the information of the record on that curve, not to points.
+
+#![forbid(unsafe_code)]
+
+mod fit;
+mod particle;
+mod regime;
+mod scene;
+
+pub use fit::{Identified, Samples, identify};
+pub use particle::{Particle, Steady};
+pub use regime::{Expected, Likelihoods, MOTIONS, RESOLUTION, TOLERANCES, one_to_one, rough_scene};
+pub use scene::Scene;
