@@ -88,7 +88,7 @@ pub struct Record {
     /// Power of the frequency, over omega0, by which the force on this response grows: 2 for an impulse on the mass whose displacement is measured, 0
     /// for the displacement of a particle in the sum of both.
     pub power: i32,
-    /// Its periods; variances are averages over [`AVERAGED`] of them.
+    /// Its periods; variances are averages over `AVERAGED` of them.
     pub periods: Periods,
     /// Response without its linear part.
     pub departure: Vec<Complex64>,
