@@ -88,7 +88,7 @@ pub struct Record {
     /// Power of the frequency, over omega0, by which the force on this response grows: 2 for an impulse on the mass whose displacement is measured, 0
     /// for the displacement of a particle in the sum of both.
     pub power: i32,
-    /// Its periods; variances are averages over [`AVERAGED`] of them.
+    /// Its periods; variances are averages over `AVERAGED` of them.
     pub periods: Periods,
     /// Response without its linear part.
     pub departure: Vec<Complex64>,
@@ -99,7 +99,7 @@ pub struct Record {
 /// Periods over which the variance of noise is averaged: a hundred degrees of freedom each, so that its own error of 3 % does not count.
 const AVERAGED: usize = 21;
 
-/// Average over [`AVERAGED`] values, mirrored at the ends.
+/// Average over `AVERAGED` values, mirrored at the ends.
 fn averaged(values: &[f64]) -> Vec<f64> {
     let (half, last) = (AVERAGED as isize / 2, values.len() as isize - 1);
     let at = |k: isize| {

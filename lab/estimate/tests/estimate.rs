@@ -35,10 +35,7 @@ fn the_linear_response_to_a_sine_is_that_of_the_frequency_response() {
     let expected = LINEAR.base(omega) / LINEAR.taken(omega) * (half.sin() / half).powi(2);
     for (k, response) in response.iter().enumerate().skip(90_000).take(1_000) {
         let exact = (expected * Complex64::cis(omega * k as f64 * SAMPLE_TIME)).im;
-        assert!(
-            (response - exact).abs() < 1e-5 * expected.norm(),
-            "{response} {exact}"
-        );
+        assert!((response - exact).abs() < 1e-5 * expected.norm(), "{response} {exact}");
     }
 }
 
