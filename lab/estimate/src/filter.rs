@@ -36,7 +36,7 @@ pub struct Filter {
     pub logarithms: f64,
 }
 
-/// Variance, over that of the noise, by which a period that is not used lets the state go: 1e4 standard deviations of it.
+/// Variance, over that of the noise, by which a period that is not used lets the state go: 3e4 standard deviations of it.
 const FORGET: f64 = 1e9;
 
 fn rotation(z: Complex64) -> Matrix2<f64> {

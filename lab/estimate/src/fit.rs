@@ -92,6 +92,10 @@ impl<'a> Estimate<'a> {
         used.iter_mut()
             .zip(&columns.lost)
             .for_each(|(used, lost)| *used &= !lost);
+        // The drift of a fundamental is known between two others of the same motion only.
+        let kept = used.clone();
+        let neighbours = |k: usize| k > 0 && kept[k - 1] && kept.get(k + 1).is_some_and(|next| *next);
+        used.iter_mut().enumerate().for_each(|(k, used)| *used &= neighbours(k));
         columns.keep_feedback(&used);
         let seconds = coefficients.windows(3).map(|c| (c[0] - 2.0 * c[1] + c[2]).norm_sqr());
         let least = SHAPE * (seconds.sum::<f64>() / (FUNCTIONS - 2) as f64).sqrt() / scale;

@@ -99,7 +99,7 @@ pub struct Record {
 /// Periods over which the variance of noise is averaged: a hundred degrees of freedom each, so that its own error of 3 % does not count.
 const AVERAGED: usize = 21;
 
-/// Average over [`AVERAGED`] values, mirrored at the ends.
+/// Average over `AVERAGED` values, mirrored at the ends.
 fn averaged(values: &[f64]) -> Vec<f64> {
     let (half, last) = (AVERAGED as isize / 2, values.len() as isize - 1);
     let at = |k: isize| {

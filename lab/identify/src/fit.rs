@@ -68,7 +68,7 @@ const STILL: f64 = 0.1;
 const FEWEST: usize = 30;
 /// Gain of a further step, relative to one and chi-square, at which the minimum counts as found.
 const FOUND: f64 = 1e-6;
-/// Step of a derivative, relative: the truncation of a central difference is far below what a record resolves.
+/// Step of a central difference, relative.
 const STEP: f64 = 1e-6;
 
 /// A least-squares model without traces.

@@ -160,7 +160,7 @@ fn mixture(windows: &[Window], scene: &Scene, [r, b]: [f64; 2]) -> (f64, [f64; 3
 
 /// Tolerances of a force over the scale: with the rough scene, and with that of a fit.
 pub const TOLERANCES: [f64; 2] = [0.1, 0.05];
-/// What is left of the particle's transient where a motion counts as settled: 3 % of a deviation, whose share of the force is a thirtieth.
+/// What is left of a deviation of the particle, which falls by r in half a period, after half of the periods in which it settles: 1e-3 at their end.
 const TRANSIENT: f64 = 0.03;
 /// Periods that a window may be late.
 const LATE: usize = 3;

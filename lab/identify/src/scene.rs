@@ -22,7 +22,7 @@ pub struct Scene {
     pub epsilon: f64,
 }
 
-/// Points of a backbone: its force is interpolated to 1e-6 of it.
+/// Points of a backbone.
 const POINTS: usize = 200;
 /// Largest speed of the particle over `b omega`: the symmetric motion becomes unstable above 1.07.
 const FASTEST: f64 = 1.3;

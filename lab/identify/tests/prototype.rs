@@ -1,8 +1,8 @@
 //! The estimator against a prototype in Python, on a record of an independent simulator: a hold, a sweep and a decay of 140 periods, at 50 dB.
 //!
-//! `prototype.json` has the samples, in 1e-8 m (response) and 1e-10 m (base), and what the prototype computed of them with numpy 2.4 and scipy 1.17. Two
-//! things were changed in the prototype: the drift of a period's fundamental is taken in the frame of the response, and its second derivative is taken
-//! off as well. The errors of the path, and the curvature that is expected of the force, are new here, and switched off where values are compared.
+//! `prototype.json` has the samples, in 1e-8 m (response) and 1e-10 m (base), and what the prototype computed of them with numpy 2.4 and scipy 1.17. Three
+//! things were changed in the prototype: the drift of a period's fundamental is taken in the frame of the response, its second derivative is taken
+//! off as well, and a period counts between two others only. The errors of the path, and the curvature that is expected of the force, are new here, and switched off where values are compared.
 
 use std::f64::consts::TAU;
 
