@@ -299,3 +299,28 @@ fn follower(oscillator: &Oscillator, [u0, u1, u2, u3]: [f64; 4]) -> [f64; 4] {
     let s0 = (-2.0 * u2 - 2.0 * oscillator.delta * s1) / oscillator.omega0_squared;
     [u0 + s0, u1 + s1, u2, u3]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base_motion::{Drive, Phase};
+
+    #[test]
+    fn a_drive_of_negative_frequency_turns_backwards() {
+        let (amplitude, omega, start) = (0.3, 1.7, 0.9_f64);
+        for omega in [omega, -omega] {
+            let phase = Phase::default().advanced(1.0, start);
+            let base = BaseMotion { drive: Drive::harmonic(amplitude, omega), phase };
+            let phasor = phasor(&base).expect("a drive");
+            for t in [0.0, 0.4, 2.0] {
+                let turned = phasor * Complex64::from_polar(1.0, omega.abs() * t);
+                let expected = amplitude * libm::sin(start + omega * t);
+                assert!(
+                    (turned.im - expected).abs() < 1e-15,
+                    "{omega} {t}: {} {expected}",
+                    turned.im
+                );
+            }
+        }
+    }
+}

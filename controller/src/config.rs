@@ -619,6 +619,18 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_bandwidth_is_one_radian_per_coefficient_and_sample() {
+        let config = Config {
+            sample_time: 1e-4,
+            harmonics: 3,
+            ..Config::for_resonance(55.0, 1e-4)
+        };
+        assert_eq!(config.bandwidth_max(), 1.0 / (7.0 * 1e-4));
+        let demodulator = Config { detector: Detector::Demodulator, ..config };
+        assert_eq!(demodulator.bandwidth_max(), 1.0 / 1e-4);
+    }
+
+    #[test]
     fn a_whole_number_out_of_range_is_refused_at_once() {
         let mut config = Config::for_resonance(55.0, 1e-4);
         for (name, value) in [("harmonics", 9), ("harmonics", -1), ("lock.dwell", 0), ("detector", 3)] {

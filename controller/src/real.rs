@@ -145,3 +145,24 @@ mod precision {
         sincos(x).0
     }
 }
+
+#[cfg(test)]
+#[cfg(feature = "f32")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sine_and_cosine_of_two_turns_are_right_to_2e_7_and_a_length_is_exact_where_it_can_be() {
+        for n in -1000..=1000_i16 {
+            let x = Real::from(n) * 0.0126;
+            let (sine, cosine) = sincos(x);
+            let errors = [(sine, libm::sin(x.into())), (cosine, libm::cos(x.into()))];
+            assert!(
+                errors.iter().all(|(a, b)| (f64::from(*a) - b).abs() < 2e-7),
+                "{x}: {errors:?}"
+            );
+            assert_eq!(sin(x), sine);
+        }
+        assert_eq!(hypot(3.0, -4.0), 5.0);
+    }
+}

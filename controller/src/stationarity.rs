@@ -324,6 +324,17 @@ mod tests {
     }
 
     #[test]
+    fn a_modulation_within_the_noise_of_the_readings_shows_in_the_means_of_quarters() {
+        // A range of 0.04, where noise alone may have 0.045; means of quarters differ by 0.025 or more, by noise at most by 0.02.
+        let rate = core::f64::consts::TAU / 40.0;
+        let reading = |t: f64| LockSample {
+            amplitude: 1.0 + 0.02 * libm::sin(rate * t),
+            ..noisy(0.0, 0.01)(t)
+        };
+        assert_eq!(periods_to_settle(reading), None);
+    }
+
+    #[test]
     fn one_invalid_sample_restarts_the_dwell() {
         let reading = |t: f64| LockSample { valid: t != 10.5, ..CONSTANT };
         assert_eq!(periods_to_settle(reading), Some(30));

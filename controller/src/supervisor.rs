@@ -225,7 +225,14 @@ mod tests {
 
     #[test]
     fn a_latched_state_ends_only_when_active_becomes_false() {
-        for state in [LoopState::LockLost, LoopState::Tripped] {
+        let latched = [LoopState::LockLost, LoopState::Tripped];
+        assert!(
+            LoopState::ALL
+                .into_iter()
+                .filter(|state| state.is_latched())
+                .eq(latched)
+        );
+        for state in latched {
             assert_eq!(state.next(&ACTIVE).0, state);
             assert_eq!(state.next(&Conditions { active: false, ..ACTIVE }).0, LoopState::Idle);
         }

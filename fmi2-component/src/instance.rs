@@ -154,7 +154,6 @@ impl<C: Component> Instance<C> {
         {
             session.state = match refusal.status() {
                 Status::Discard => State::StepFailed,
-                Status::Fatal => State::Fatal,
                 _ => State::Error,
             };
             return Err(refusal);

@@ -361,6 +361,8 @@ fn null_arrays_and_absurd_counts_are_refused() {
     refused!(m.fmi2GetReal(null(), 1, &mut 0.0) => "vr is NULL");
     refused!(m.fmi2GetReal(&LEVEL, 1, null_mut()) => "value is NULL");
     refused!(m.fmi2SetReal(&INFLOW, usize::MAX, &0.0) => "count of vr is 18446744073709551615");
+    refused!(m.fmi2SetReal(&INFLOW, usize::MAX, null()) => "count of vr is 18446744073709551615");
+    refused!(m.fmi2GetReal(null(), 1, null_mut()) => "vr is NULL");
     let askew = std::ptr::from_ref(&INFLOW).wrapping_byte_add(1);
     refused!(m.fmi2GetReal(askew, 1, &mut 0.0) => "vr is not aligned");
     refused!(m.fmi2GetString(&0, 1, null_mut()));

@@ -45,6 +45,9 @@ fn each_interface_and_each_mode_has_its_own_functions() {
     resolve(&m);
     go_on(&m);
     m.well(call!(m.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)));
+    let mut numbers = [0.0; 6];
+    refused!(m.fmi2GetEventIndicators(numbers.as_mut_ptr(), 6) => "ni = 6 is refused; expected 5");
+    refused!(m.fmi2GetDerivatives(numbers.as_mut_ptr(), 4) => "nx = 4 is refused; expected 5");
     refused!(m.fmi2NewDiscreteStates(&mut EventInfo::default()));
     // A parameter is not tuned while the integrator runs.
     refused!(m.fmi2SetReal(&2, 1, &4.0));
