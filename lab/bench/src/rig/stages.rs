@@ -120,13 +120,16 @@ impl<R: Rig> RigStage for Measured<R> {
             Reference::Force => force(three),
         };
         let base = first.reference.zip(middle.reference).zip(self.now.reference);
-        let inertia = self.compensated.map_or(0.0, |(mass, _)| {
-            let [now, middle, first] = self.cell;
-            mass * derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0)
-        });
+        let without_inertia = |force: f64| {
+            self.compensated.map_or(force, |(mass, _)| {
+                let [now, middle, first] = self.cell;
+                let acceleration = derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0);
+                mass.mul_add(-acceleration, force)
+            })
+        };
         Ok(Sensors {
             response: read(0, [first.response, middle.response, self.now.response]),
-            reference: base.map(|((first, middle), now)| of_base([first, middle, now]) - inertia),
+            reference: base.map(|((first, middle), now)| without_inertia(of_base([first, middle, now]))),
         })
     }
 
