@@ -52,13 +52,6 @@ pub fn load(path: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
     let mut starts = scene.start_values();
     // A structure starts at rest.
     starts.retain(|(name, _)| structure.is_none() || !["q1", "der(q1)"].contains(name));
-    let of_driven_mode = structure.map(|structure| {
-        [
-            structure.base_per_command(),
-            structure.base_per_drive(),
-            structure.reading_per_response(),
-        ]
-    });
     let rig = FmuRig::load(
         path,
         &Asked {
@@ -70,7 +63,7 @@ pub fn load(path: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
             cell: structure.and_then(at_cell),
             starts,
             has_friction: has_friction(&scene.plant),
-            of_driven_mode,
+            direction: structure.map_or(1.0, Structure::direction),
         },
     )?;
     // A variable that the scene names is what it is measured as; velocities and accelerations of our own variables are differences.

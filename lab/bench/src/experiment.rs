@@ -17,8 +17,7 @@ use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
 use vines_scene::knowledge::Target;
 use vines_scene::plan::{DECAYED, Plan};
-use vines_scene::scene::Units;
-use vines_scene::scene::key;
+use vines_scene::scene::{Unit, Units, key};
 
 pub use judge::Condition;
 use judge::Judge;
@@ -312,29 +311,27 @@ pub enum ExperimentError {
     },
     #[error(
         "the controller asked for {} {}, and {} allows {} {}; the drive is off. Its output E is {}",
-        short(*amplitude * units.drive), units.name, key("amplitude_max"), short(*limit * units.drive), units.name,
-        match units.name {
-            "N" => format!("the force over {} N/m, in m", short(units.drive)),
+        short(*amplitude), unit.symbol, key("amplitude_max"), short(*limit), unit.symbol,
+        match unit.symbol {
+            "N" => format!("the force over {} N/m, in m", short(unit.of_metres(1.0))),
             _ => "the amplitude of the base in metres".into(),
         }
     )]
     DriveTooLarge {
-        /// m
+        /// In its unit.
         amplitude: f64,
-        /// m
         limit: f64,
-        units: Units,
+        unit: Unit,
     },
     #[error(
-        "the response read {} m, and {} allows {} m, but the controller did not stop; the drive is off",
-        short(*response * units.response), key("response_max"), short(*limit * units.response)
+        "the response read {} {unit}, and {} allows {} {unit}, but the controller did not stop; the drive is off",
+        short(*response), key("response_max"), short(*limit)
     )]
     ResponseTooLarge {
-        /// m
+        /// In its unit.
         response: f64,
-        /// m
         limit: f64,
-        units: Units,
+        unit: &'static str,
     },
     #[error(
         "the controller asked for omega = {} rad/s; the scene allows {} to {} rad/s ({}, {}), and a factor of 2 pi lies between. omega is an \
@@ -519,7 +516,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         let clock = [self.taken as f64 * self.sample_time, self.sample_time];
         let is_latched = |command: &Command| command.state.is_some_and(LoopState::is_latched);
         let (requested, since_release) = (self.plan.amplitude, self.natural_periods(self.taken - self.stage.1 + 1));
-        let (config, units) = (self.config, self.plan.units);
+        let (config, units) = (self.config, self.plan.knowledge.target.units);
         let (samples, driven) = (&mut *self.samples, &mut self.driven);
         let before_drive = |sample: &Sample| {
             let command = checked(sample.command)?;
@@ -653,7 +650,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if fault == Fault::TimedOut {
             return self.no_lock(command);
         }
-        let mut evidence = evidence(self.samples, self.config, self.plan.units, fault);
+        let mut evidence = evidence(self.samples, self.config, self.plan.knowledge.target.units, fault);
         if let Some(path) = self.plan.knowledge.shaker {
             evidence.contradicts = contradicts(self.samples, self.sample_time, path.drop_out());
         }
@@ -721,10 +718,14 @@ fn guard(config: &Config, units: Units, response: f64, drive: Drive) -> Result<(
     // A controller may compute in single precision.
     let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
     if let Some(limit) = beyond(amplitude, amplitude_max) {
-        return Err(ExperimentError::DriveTooLarge { amplitude, limit, units });
+        let unit = units.reference;
+        let [amplitude, limit] = [amplitude, limit].map(|value| unit.of_metres(value));
+        return Err(ExperimentError::DriveTooLarge { amplitude, limit, unit });
     }
     if let Some(limit) = beyond(response.abs(), response_max) {
-        return Err(ExperimentError::ResponseTooLarge { response, limit, units });
+        let [response, limit] = [response, limit].map(|value| units.response.of_metres(value));
+        let unit = units.response.symbol;
+        return Err(ExperimentError::ResponseTooLarge { response, limit, unit });
     }
     let allowed = [omega_min, omega_max];
     let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
@@ -768,7 +769,7 @@ fn evidence(samples: &[Sample], config: &Config, units: Units, fault: Fault) -> 
     });
     let limit = match fault {
         Fault::ResponseTooLarge => {
-            let limit = config.response_max.map(|limit| limit * units.response);
+            let limit = config.response_max.map(|limit| units.response.of_metres(limit));
             Some(("response_max", limit, " m"))
         }
         Fault::LockLost => Some(("lock.unlock_tolerance", Some(config.lock.unlock_tolerance), " rad")),
@@ -779,10 +780,10 @@ fn evidence(samples: &[Sample], config: &Config, units: Units, fault: Fault) -> 
         Fault::Sensor | Fault::TimedOut => None,
     };
     Evidence {
-        response: last.response * units.response,
-        reference: last.reference.map(|value| value * units.drive),
-        unit: units.name,
-        largest: largest * units.response,
+        response: units.response.of_metres(last.response),
+        reference: last.reference.map(|value| units.reference.of_metres(value)),
+        unit: units.reference.symbol,
+        largest: units.response.of_metres(largest),
         phase_error,
         limit,
         contradicts: None,
@@ -841,19 +842,15 @@ mod tests {
             (Fault::LockLost, "phase_lock.lock.unlock_tolerance is 0.2 rad"),
             (Fault::LockLost, "the phase error is 14.324 degrees"),
         ] {
-            let text = evidence(&samples, &scene.controller_config(), scene.plan().units, fault).to_string();
+            let text = evidence(&samples, &scene.controller_config(), scene.units(), fault).to_string();
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
         // Under a force, 0.01 m of the driven mode's base are newtons, and its response is read at the sensor.
         let text = include_str!("../../../scenes/frame.toml");
         let force = Scene::parse("frame.toml", text, &[]).unwrap();
-        let structure = force.structure.as_ref().unwrap();
-        let [newtons, metres] = [
-            0.01 / structure.base_per_drive(),
-            0.2 * structure.reading_per_response().abs(),
-        ]
-        .map(short);
-        let text = evidence(&samples, &force.controller_config(), force.plan().units, Fault::Sensor).to_string();
+        let Units { reference, response, .. } = force.units();
+        let [newtons, metres] = [reference.of_metres(0.01), response.of_metres(0.2)].map(short);
+        let text = evidence(&samples, &force.controller_config(), force.units(), Fault::Sensor).to_string();
         assert!(
             text.contains(&format!("the response read {metres} m, and the force {newtons} N")),
             "{text}"

@@ -310,8 +310,8 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
 
 /// Mean amplitude of the command of a shaker in samples, V; `None` without a shaker.
 pub(crate) fn mean_command(samples: &[Sample], knowledge: &Knowledge) -> Option<f64> {
-    let path = knowledge.shaker?;
-    Some(mean(samples.iter().map(|sample| sample.shaker_command)) / path.base_per_command)
+    knowledge.shaker?;
+    Some(mean(samples.iter().map(|sample| sample.shaker_command)))
 }
 
 /// The last periods before the release.
@@ -406,7 +406,8 @@ impl ResonancePoint {
     pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], knowledge: &Knowledge) -> Self {
         let d = &knowledge.numbers;
         let [response, base, omega] = knowledge.linear.resolved([response, base, omega]);
-        let force = |amplitude: f64| Some(amplitude / knowledge.base_per_newton?);
+        let reference = knowledge.target.units.reference;
+        let force = |amplitude: f64| (reference.symbol == "N").then(|| reference.of_metres(amplitude));
         Self {
             f_hz: omega.value / TAU,
             a_m: response.value,

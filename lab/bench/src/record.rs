@@ -4,30 +4,33 @@ use std::fmt::Write;
 
 use crate::rig::{Command, Drive, GroundTruth, Sensors};
 use vines_scene::knowledge::Target;
-use vines_scene::scene::Measurand;
+use vines_scene::scene::{Measurand, Units};
 
 /// One sample of the record.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sample {
     /// Time, s.
     pub time: f64,
-    /// What the sensors read: in SI units in a recording, otherwise in m, as [`Target::scaled`] says.
+    /// What the sensors read: in the units of their channels in a recording, otherwise in m, as [`Target::scaled`] says.
     pub sensors: Sensors,
-    /// Output of the controller: the drive from this sample to the next.
+    /// Output of the controller: the drive from this sample to the next; in a recording, the command of the rig.
     pub command: Command,
     /// The ground truth of a simulated rig.
     pub ground_truth: Option<GroundTruth>,
-    /// Amplitude of the command of a shaker from this sample to the next, m as the bench converts commands; 0 without a shaker.
+    /// Amplitude of the command of a shaker from this sample to the next, V; 0 without a shaker.
     pub shaker_command: f64,
 }
 
-/// First line of a recording (CSV), with the units of channels that are no displacements.
-pub fn headings(measurands: [Measurand; 2]) -> String {
-    let [response, reference] = measurands.map(|measurand| match measurand {
-        Measurand::Displacement => String::new(),
-        other => format!(" [{}]", other.unit()),
+/// First line of a recording (CSV) of a rig with the channels of `target`, with the units that are not m.
+pub fn headings(target: &Target) -> String {
+    let Units { command, reference, .. } = target.units;
+    let [response, base] = target.measurands.map(Measurand::unit);
+    let reference = if reference.symbol == "N" { "N" } else { base };
+    let [response, reference, command] = [response, reference, command.symbol].map(|unit| match unit {
+        "m" => String::new(),
+        other => format!(" [{other}]"),
     });
-    format!("time,response{response},reference{reference},omega,E,phase_error,state,fault\n")
+    format!("time,response{response},reference{reference},omega,E{command},phase_error,state,fault\n")
 }
 
 /// Appends a sample to a recording, as a line.
@@ -48,12 +51,18 @@ pub fn write_row(text: &mut String, sample: &Sample) {
     );
 }
 
-/// The samples of an experiment as a recording, in SI units.
+/// The samples of an experiment as a recording, in the units of the channels.
 pub fn table(samples: &[Sample], target: &Target) -> String {
-    let mut text = headings(target.measurands);
+    let mut text = headings(target);
     for sample in samples {
         let sensors = target.unscaled(sample.sensors);
-        write_row(&mut text, &Sample { sensors, ..*sample });
+        // Behind a shaker the command is not the drive that the controller asks for.
+        let mut command = sample.command;
+        command.drive = match sample.shaker_command {
+            0.0 => target.command(command.drive),
+            amplitude => Drive { amplitude, ..command.drive },
+        };
+        write_row(&mut text, &Sample { sensors, command, ..*sample });
     }
     text
 }

@@ -9,7 +9,7 @@ use vines_model::orbit::{
 };
 
 use crate::fit::{self, Contradiction, MeasuredPoint};
-use vines_scene::scene::{Scene, Structure};
+use vines_scene::scene::{Scene, Structure, Units};
 
 /// Orbits on a curve.
 const CURVE_ORBITS: usize = 400;
@@ -172,18 +172,15 @@ pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExactOrbits {
     numbers: Dimensionless,
-    /// Of a structure: its orbits, base per drive and reading per response.
-    structure: Option<(StructureOrbits, [f64; 2])>,
+    /// Of a structure: its orbits, and the units of its channels.
+    structure: Option<(StructureOrbits, Units)>,
 }
 
 impl ExactOrbits {
     /// Those of the oscillator or the structure of a scene.
     pub fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
         let structure = scene.structure.as_ref().zip(scene.structure_orbits());
-        let structure = structure.map(|(structure, orbits)| {
-            let units = [structure.base_per_drive(), structure.reading_per_response().abs()];
-            (orbits, units)
-        });
+        let structure = structure.map(|(structure, orbits)| (orbits, structure.units()));
         Self { numbers: *numbers, structure }
     }
 
@@ -195,12 +192,13 @@ impl ExactOrbits {
     /// The orbit with the response C, near a detuning and a speed of the particle.
     pub fn with_amplitude(&self, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
         let d = &self.numbers;
-        let Some((orbits, [per_drive, per_response])) = &self.structure else {
+        let Some((orbits, units)) = &self.structure else {
             return orbit::with_amplitude(d, c, [sigma, speed]);
         };
         let near = [d.omega(sigma), speed * d.b * d.omega0];
-        let found = orbits.at_response(c * d.b * per_response, near)?;
-        Some(found.in_numbers(d, *per_drive, *per_response))
+        let found = orbits.at_response(units.response.of_metres(c * d.b), near)?;
+        let [per_drive, per_response] = per_unit(units);
+        Some(found.in_numbers(d, per_drive, per_response))
     }
 }
 
@@ -218,7 +216,7 @@ pub fn structure_curves(
         true => orbits.frequency_response(scene.structure_drive()?, &range),
         false => orbits.backbone(&range),
     };
-    let [per_drive, per_response] = [structure.base_per_drive(), structure.reading_per_response().abs()];
+    let [per_drive, per_response] = per_unit(&structure.units());
     let told = branches
         .iter()
         .map(|branch| branch.in_numbers(numbers, per_drive, per_response));
@@ -246,7 +244,7 @@ pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<Mea
     let moved = |mut point: MeasuredPoint| {
         let definition = scene.definition().at_phase(point.phase);
         let numbers = Dimensionless { definition, ..scene.dimensionless() };
-        let response = point.response.value * structure.reading_per_response().abs();
+        let response = structure.units().response.of_metres(point.response.value);
         let all = with_response(&orbits.clone().with_target(point.phase), response, point.omega.value)?;
         let all = of_driven_mode(&all, structure, &numbers);
         let alone = at_amplitude(&numbers, point.response.value / numbers.b)?;
@@ -269,11 +267,13 @@ pub fn contradiction(scene: &Scene, points: Vec<MeasuredPoint>) -> Option<Contra
 
 /// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity.
 fn of_driven_mode(orbit: &StructureOrbit, structure: &Structure, numbers: &Dimensionless) -> Orbit {
-    orbit.in_numbers(
-        numbers,
-        structure.base_per_drive(),
-        structure.reading_per_response().abs(),
-    )
+    let [per_drive, per_response] = per_unit(&structure.units());
+    orbit.in_numbers(numbers, per_drive, per_response)
+}
+
+/// Base of the oscillator per reference, and displacement at the sensor per response of the oscillator.
+fn per_unit(units: &Units) -> [f64; 2] {
+    [units.reference.in_metres(1.0), units.response.of_metres(1.0)]
 }
 
 /// The section of the driven mode: the nearest in frequency.

@@ -17,15 +17,25 @@ pub use names::{Name, Names};
 pub use phase_lock::{Fault, LoopState, Move};
 pub use vines_model::{Definition, Measurand, Reference, Sensor};
 
-/// What the controller asks of the rig for the coming sample period.
+/// What the controller asks of the rig for the coming sample period: the motion of the base, m; of a rig with another drive its force, N, or the
+/// command of its shaker, V.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Drive {
-    /// Frequency of the base motion, rad/s.
+    /// Frequency, rad/s.
     pub omega: f64,
-    /// Amplitude of the base motion, m.
+    /// Amplitude.
     pub amplitude: f64,
-    /// Present base displacement, m, for a rig that is driven by samples.
+    /// Present value, for a rig that is driven by samples.
     pub displacement: f64,
+}
+
+impl Drive {
+    /// This drive in another unit.
+    #[must_use]
+    pub fn map(self, convert: impl Fn(f64) -> f64) -> Self {
+        let [amplitude, displacement] = [self.amplitude, self.displacement].map(convert);
+        Self { amplitude, displacement, ..self }
+    }
 }
 
 /// What the sensors of the rig read.
@@ -33,7 +43,7 @@ pub struct Drive {
 pub struct Sensors {
     /// Response, m, m/s or m/s², as the definition of resonance says.
     pub response: f64,
-    /// Motion of the base, m, m/s or m/s², where a sensor reads it.
+    /// Motion of the base, m, m/s or m/s², or the force on a structure, N, where a sensor reads it.
     pub reference: Option<f64>,
 }
 

@@ -7,15 +7,16 @@ use lovines::{Cavity, Parameters, Restitution};
 use num_complex::Complex64;
 use vines_model::numerics::{Estimate, mean, noise, noise_at};
 use vines_model::{Definition, Dimensionless, Measurand, Sensor};
-use vines_rig::Sensors;
+use vines_rig::{Drive, Sensors};
 
 use crate::filter::LowPass;
 use crate::linear::{LinearResponse, MeasuredLinear};
 use crate::shaker_path::ShakerPath;
+use crate::units::Units;
 
 /// What a loop holds: the phase of the response relative to the reference, both as displacements. The two channels may read velocities and
-/// accelerations. The bench divides these by omega0 and omega0², so that controllers have the same gains and limits for all of them, and shifts
-/// the phase that the controller holds. Amplitudes and phases of displacements follow harmonic by harmonic.
+/// accelerations. The bench divides these by omega0 and omega0², and takes all of them as metres of the oscillator, so that controllers have the same
+/// gains and limits for all of them, and shifts the phase that the controller holds. Amplitudes and phases of displacements follow harmonic by harmonic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
     /// Phase of the response relative to the reference, rad.
@@ -30,32 +31,55 @@ pub struct Target {
     pub filter: Option<f64>,
     /// How late the readings of the response are, s: without a reference, the drive of so long ago is the reference.
     pub delay: f64,
+    /// The units of the channels.
+    pub units: Units,
     /// The base is held from sample to sample: its fundamental is smaller than that of the samples.
     pub held: bool,
 }
 
 impl Target {
-    /// Metres per reading of a channel: 0, the response, or 1, the reference.
+    /// Displacement per reading of a channel at omega0: 0, the response, or 1, the reference.
     pub fn scale(&self, channel: usize) -> f64 {
         self.omega0.powi(-self.measurands[channel].order())
     }
 
-    /// Readings in SI units as displacements, m, as a loop with this target takes them.
+    /// A reading of a channel in its unit, as a displacement in metres of the oscillator.
+    pub fn in_metres(&self, channel: usize, reading: f64) -> f64 {
+        let unit = [self.units.response, self.units.reference][channel];
+        unit.in_metres(reading) * self.scale(channel)
+    }
+
+    /// Readings in the units of their channels as displacements in metres of the oscillator, as a loop with this target takes them.
     #[must_use]
     pub fn scaled(&self, sensors: Sensors) -> Sensors {
         Sensors {
-            response: sensors.response * self.scale(0),
-            reference: sensors.reference.map(|value| value * self.scale(1)),
+            response: self.in_metres(0, sensors.response),
+            reference: sensors.reference.map(|value| self.in_metres(1, value)),
         }
     }
 
-    /// Readings in SI units, from [`Target::scaled`].
+    /// Readings in the units of their channels, from [`Target::scaled`].
     #[must_use]
     pub fn unscaled(&self, sensors: Sensors) -> Sensors {
+        let Units { response, reference, .. } = self.units;
         Sensors {
-            response: sensors.response / self.scale(0),
-            reference: sensors.reference.map(|value| value / self.scale(1)),
+            response: response.of_metres(sensors.response / self.scale(0)),
+            reference: sensors
+                .reference
+                .map(|value| reference.of_metres(value / self.scale(1))),
         }
+    }
+
+    /// A drive in metres of the oscillator, as the command of a rig.
+    #[must_use]
+    pub fn command(&self, drive: Drive) -> Drive {
+        drive.map(|metres| self.units.command.of_metres(metres))
+    }
+
+    /// The command of a rig, in metres of the oscillator.
+    #[must_use]
+    pub fn drive(&self, command: Drive) -> Drive {
+        command.map(|value| self.units.command.in_metres(value))
     }
 
     /// Displacement over the scaled reading of a channel, at a harmonic of the frequency `omega`, rad/s.
@@ -129,8 +153,6 @@ pub struct Knowledge {
     pub sample_time: f64,
     /// Phase of the response relative to the reference that the loop holds, and what is measured of both.
     pub target: Target,
-    /// Base displacement per newton of a structure that a force drives, m/N.
-    pub base_per_newton: Option<f64>,
     /// The shaker, if one stands between the command and the reference, which then drives the structure as it is measured.
     pub shaker: Option<ShakerPath>,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
@@ -150,6 +172,7 @@ impl Knowledge {
             through_shaker: false,
             filter: None,
             delay: 0.0,
+            units: Units::OSCILLATOR,
             held: false,
         };
         Self {
@@ -160,7 +183,6 @@ impl Knowledge {
             carried_up_to: carried_up_to(plant),
             sample_time,
             target,
-            base_per_newton: None,
             shaker: None,
             nearest_pole: f64::INFINITY,
             ringing: 0.0,

@@ -10,3 +10,4 @@ pub mod linear;
 pub mod plan;
 pub mod scene;
 pub mod shaker_path;
+pub mod units;

@@ -4,7 +4,7 @@ use lovines::Section;
 use phase_lock::Config;
 
 use crate::knowledge::Knowledge;
-use crate::scene::{Scene, Structure, Units};
+use crate::scene::{Scene, Structure};
 
 /// An experiment on a rig: what is known of it, and what is done.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,8 +31,6 @@ pub struct Plan {
     pub levels: Vec<f64>,
     /// Largest relative uncertainty of a level, as in [`BackboneSettings`](crate::scene::BackboneSettings).
     pub precision: f64,
-    /// The units of the scene.
-    pub units: Units,
 }
 
 impl Plan {
@@ -73,7 +71,6 @@ impl Scene {
             decay: knowledge.samples(decay),
             levels: self.backbone.levels(self.plant.half_width),
             precision: self.backbone.precision,
-            units: self.units(),
         }
     }
 }

@@ -48,8 +48,9 @@ use toml::Table;
 
 use crate::knowledge::{Knowledge, has_friction};
 
+pub use crate::units::{Unit, Units};
 pub use chain::ChainSettings;
-pub use controller::{ControllerSettings, KEYS, PhaseLock, Units, key, phase_target, refusal};
+pub use controller::{ControllerSettings, KEYS, PhaseLock, key, phase_target, refusal};
 pub use error::SceneError;
 pub use implausible::Implausible;
 pub use lovines::{Parameters, table::PARAMETERS as PLANT_PARAMETERS};
@@ -129,6 +130,11 @@ impl Scene {
         Definition { reference, phase, ..self.resonance }
     }
 
+    /// The units of the channels of its rig.
+    pub fn units(&self) -> Units {
+        self.structure.as_ref().map_or(Units::OSCILLATOR, Structure::units)
+    }
+
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
     pub fn dimensionless_start(&self) -> [f64; 4] {
         self.dimensionless().state(&self.start)
@@ -198,11 +204,7 @@ impl Scene {
             path.aliased = self.aliased(1.0).unwrap_or(0.0);
         }
         knowledge.target.through_shaker = knowledge.shaker.is_some();
-        let forced = self
-            .structure
-            .as_ref()
-            .filter(|one| one.excitation == Excitation::Force);
-        knowledge.base_per_newton = forced.map(Structure::base_per_drive);
+        knowledge.target.units = self.units();
         knowledge.nearest_pole = self.structure.as_ref().map_or(f64::INFINITY, Structure::nearest_pole);
         knowledge.ringing = self.structure.as_ref().map_or(0.0, Structure::ringing);
         knowledge.target.held = self.chain.hold;
@@ -245,7 +247,12 @@ impl Scene {
             .host
             .frequency_response_to_cavity(&reference, at * omega)
             .norm();
-        Some(force * impacts * at.powi(order) * passed * structure.base_per_drive())
+        Some(
+            structure
+                .units()
+                .reference
+                .in_metres(force * impacts * at.powi(order) * passed),
+        )
     }
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured. It has 31 significant bits (2e-10 of it is

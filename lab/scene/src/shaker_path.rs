@@ -16,16 +16,10 @@ pub struct ShakerPath {
     pub pole: Complex64,
     /// Damping rate of the structure, rad/s.
     pub damping_rate: f64,
-    /// Whether the reference is a force, and not the displacement of a table.
-    pub by_force: bool,
     /// Largest command, m; infinite without a limit.
     pub largest: f64,
     /// Bandwidths of the control of the reference, over those without another resonance of structure and shaker.
     pub speed: f64,
-    /// Base displacement per reference, m/N or m/m.
-    pub base_per_reference: f64,
-    /// Base displacement per command, m/V, as the bench converts commands.
-    pub base_per_command: f64,
     /// Largest amplitude, m, by which harmonics of the force beside the sampling frequency change its fundamental as it is read.
     pub aliased: f64,
 }

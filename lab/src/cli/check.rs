@@ -4,7 +4,7 @@ use clap::Args;
 use vines::experiment::ExperimentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
-use vines::scene::{Excitation, Scene};
+use vines::scene::{Excitation, Scene, Units};
 use vines::{
     cells,
     table::{Table, number, with_uncertainty},
@@ -14,7 +14,7 @@ use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};
 use super::output::{output, print};
 use super::signals::Orderly;
-use super::summary::{Units, structure};
+use super::summary::structure;
 
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with
@@ -109,14 +109,14 @@ pub(super) fn named(text: &str, scene: &Scene) -> String {
 }
 
 pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
-    let Units { factors: [response, drive], names: [_, (_, unit)] } = Units::of(scene);
+    let Units { reference, response, .. } = scene.units();
     let channels = [
         ("response", Some(&checked.response), response),
-        ("base", checked.base.as_ref(), drive),
+        ("base", checked.base.as_ref(), reference),
     ];
-    let rows = channels.into_iter().filter_map(|(name, channel, factor)| {
+    let rows = channels.into_iter().filter_map(|(name, channel, unit)| {
         let CheckedChannel { gain, phase, delay, noise, floor, .. } = channel?;
-        let noises = [noise, floor].map(|noise| format!("{:.1e}", noise * factor));
+        let noises = [noise, floor].map(|noise| format!("{:.1e}", unit.of_metres(*noise)));
         let numbers = [format!("{gain:.3}"), format!("{phase:.1}"), format!("{delay:.1}")];
         Some([&[named(name, scene)][..], &numbers, &noises].concat())
     });
@@ -144,8 +144,11 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
         Some(Excitation::Force) => "F",
         _ => "E",
     };
-    let (amplitude, verdict) = (checked.amplitude * drive, named(&checked.verdict.to_string(), scene));
-    text += &format!("At {symbol} = {amplitude:.2e} {unit}: {verdict}\n");
+    let (amplitude, verdict) = (
+        reference.of_metres(checked.amplitude),
+        named(&checked.verdict.to_string(), scene),
+    );
+    text += &format!("At {symbol} = {amplitude:.2e} {}: {verdict}\n", reference.symbol);
     if checked.is_raised() {
         text += &format!(
             "The noise of the sensors needed {:.0} % of the drive; the check took {:.0} periods.\n",

@@ -104,7 +104,7 @@ impl ExperimentArguments {
         let recording = self
             .record
             .clone()
-            .map(|path| Recording::open(path, scene.resonance.measurands()))
+            .map(|path| Recording::open(path, &scene.knowledge().target))
             .transpose();
         let recording = recording.map_err(Failure::input)?;
         let mut open = match rig {

@@ -7,9 +7,9 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use vines::knowledge::Target;
 use vines::record::{Sample, headings, write_row};
 use vines::rig::Rig;
-use vines::scene::Measurand;
 use vines::{FileError, create_folder_of};
 
 use super::tap::Tap;
@@ -29,8 +29,8 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Opens the file for channels of these quantities. It stays as it is until the first sample.
-    pub(super) fn open(path: PathBuf, measurands: [Measurand; 2]) -> Result<Self, FileError> {
+    /// Opens the file for the channels of `target`. It stays as it is until the first sample.
+    pub(super) fn open(path: PathBuf, target: &Target) -> Result<Self, FileError> {
         let is_new = !path.exists();
         let open = || -> io::Result<File> {
             create_folder_of(&path)?;
@@ -43,7 +43,8 @@ impl Recording {
         };
         let file = open().map_err(FileError::at(&path))?;
         let (sender, receiver) = channel();
-        let thread = thread::spawn(move || write(file, &receiver, &headings(measurands)));
+        let headings = headings(target);
+        let thread = thread::spawn(move || write(file, &receiver, &headings));
         Ok(Self { path, is_new, sender, thread })
     }
 

@@ -90,8 +90,8 @@ pub(super) struct RigArguments {
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     silence: Option<f64>,
 
-    /// Largest drive amplitude, m [default: the half-width b of the cavity]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    /// Largest drive amplitude: m, N of a force, V of a shaker [default: that which moves as a base of the half-width b of the cavity does]
+    #[arg(long, value_name = "VALUE", value_parser = positive)]
     max_amplitude: Option<f64>,
 }
 
@@ -193,7 +193,8 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
         })
     };
     let step = scene.sample_time();
-    let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
+    let of_cavity = scene.units().command.of_metres(scene.plant.half_width);
+    let max_amplitude = arguments.max_amplitude.unwrap_or(of_cavity);
     if helic {
         let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
         return serving.serve_helic(device, step);

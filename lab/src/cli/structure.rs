@@ -81,7 +81,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         point(structure.sensor)
     );
     text += &modes(structure, survey);
-    let b = scene.plant.half_width * structure.reading_per_response().abs();
+    let b = structure.units().response.of_metres(scene.plant.half_width);
     // The reference of an orbit, and what drives it.
     let (command, of_command) = match structure.shaker {
         Some(_) => ("command, V".to_owned(), "V"),

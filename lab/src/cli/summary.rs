@@ -9,7 +9,7 @@ use vines::identification::{DecayEnd, Friction, Lock, Regime, ResonancePoint, To
 use vines::numerics::SIGNIFICANT;
 use vines::orbit::Orbit;
 use vines::regime_map::Map;
-use vines::scene::{Definition, Dimensionless, Scene};
+use vines::scene::{Definition, Dimensionless, Scene, Unit, Units};
 use vines::table::{Table, lines, note, with_uncertainty};
 
 /// The dimensionless numbers of a scene, in one line.
@@ -26,46 +26,33 @@ fn rig(p: &Dimensionless) -> String {
     format!("epsilon = {epsilon:.6}, lambda = {lambda:.4}, r = {r}")
 }
 
-/// Units of the measurements: response at the sensor, m per m of the oscillator's response; drive per m of the oscillator's base; name and unit of both.
-pub(super) struct Units {
-    pub(super) factors: [f64; 2],
-    pub(super) names: [(String, &'static str); 2],
+/// What response and drive of a scene are called, with their units.
+pub(super) fn channels(scene: &Scene) -> [(String, Unit); 2] {
+    let Units { reference, response, .. } = scene.units();
+    let [of_response, of_drive] = match &scene.structure {
+        None => ["response".into(), "base".into()],
+        Some(structure) => {
+            let point = |n: usize| &structure.points[n];
+            let drive = structure
+                .drive
+                .map_or("base".into(), |n| format!("force at {}", point(n)));
+            [format!("response at {}", point(structure.sensor)), drive]
+        }
+    };
+    [(of_response, response), (of_drive, reference)]
 }
 
-impl Units {
-    pub(super) fn of(scene: &Scene) -> Self {
-        let Some(structure) = &scene.structure else {
-            return Self {
-                factors: [1.0; 2],
-                names: [("response".into(), "m"), ("base".into(), "m")],
-            };
-        };
-        let point = |n: usize| &structure.points[n];
-        let drive = structure
-            .drive
-            .map_or("base".into(), |n| format!("force at {}", point(n)));
-        Self {
-            factors: [
-                structure.reading_per_response().abs(),
-                structure.base_per_drive().recip(),
-            ],
-            names: [
-                (format!("response at {}", point(structure.sensor)), "m"),
-                (drive, structure.excitation.unit()),
-            ],
-        }
-    }
-
-    /// Frequency in hertz, amplitude of response and drive, with their uncertainties.
-    fn values(&self, at: &ResonancePoint) -> [String; 3] {
-        let [response, drive] = self.factors;
-        let value = |value: f64, u: f64, unit: f64| format!("{:.5e} ± {:.1e}", value * unit, u * unit);
-        [
-            with_uncertainty(at.f_hz, at.u_f_hz),
-            value(at.a_m, at.u_a_m, response),
-            value(at.e_m, at.u_e_m, drive),
-        ]
-    }
+/// Frequency in hertz, amplitude of response and drive in their units, with their uncertainties.
+fn values(units: &Units, at: &ResonancePoint) -> [String; 3] {
+    let value = |metres: [f64; 2], unit: Unit| {
+        let [value, u] = metres.map(|metres| unit.of_metres(metres));
+        format!("{value:.5e} ± {u:.1e}")
+    };
+    [
+        with_uncertainty(at.f_hz, at.u_f_hz),
+        value([at.a_m, at.u_a_m], units.response),
+        value([at.e_m, at.u_e_m], units.reference),
+    ]
 }
 
 /// Why a run of the scene did not lock the symmetric 1:1 motion, and what to do.
@@ -177,9 +164,9 @@ const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitud
 /// An identification: the locked point beside theory and exact orbit, then the decay. Of a rig that does not report impacts, only what is measured.
 pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let (lock, at) = (&result.lock, &result.lock.at);
-    let units = Units::of(scene);
-    let [hertz, response, drive] = units.values(at);
-    let [(of_response, m), (of_drive, unit)] = &units.names;
+    let units = scene.units();
+    let [hertz, response, drive] = values(&units, at);
+    let [(of_response, m), (of_drive, unit)] = channels(scene).map(|(name, unit)| (name, unit.symbol));
     let measured = format!("Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n");
     let locked = |motion: String| {
         format!(
@@ -191,7 +178,10 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         )
     };
     if lock.regime_by_impacts.is_none() {
-        let (locked, decay) = (locked(lock.regime.motion().into()), decay_in_metres(result, &units));
+        let (locked, decay) = (
+            locked(lock.regime.motion().into()),
+            decay_at_sensor(result, units.response),
+        );
         let notes = [
             Some(stability(lock)),
             lock.clipped_percent.map(clipped),
@@ -296,18 +286,18 @@ fn tone(tone: Tone) -> String {
 }
 
 /// The decay, without a particle.
-fn decay_in_metres(result: &Comparison, units: &Units) -> String {
+fn decay_at_sensor(result: &Comparison, unit: Unit) -> String {
     let (first, last) = match &result.decay[..] {
         [] => return "Free decay: no points".into(),
         points => (points[0].point, points[points.len() - 1].point),
     };
-    let [per_response, _] = units.factors;
+    let m = unit.symbol;
     format!(
-        "Free decay: {} points from {:.4e} m at {:.5} Hz down to {:.4e} m at {:.5} Hz",
+        "Free decay: {} points from {:.4e} {m} at {:.5} Hz down to {:.4e} {m} at {:.5} Hz",
         result.decay.len(),
-        first.a_m * per_response,
+        unit.of_metres(first.a_m),
         first.f_hz,
-        last.a_m * per_response,
+        unit.of_metres(last.a_m),
         last.f_hz
     )
 }
@@ -331,30 +321,31 @@ pub(super) fn structure(scene: &Scene, reports_impacts: bool) -> String {
     format!(
         "{masses}{numbers} {}, as are A_m and E_m in files: {:.5e} m and {:.5e} m per unit of response and drive\n",
         structure.driven + 1,
-        structure.reading_per_response().abs().recip(),
-        structure.base_per_drive()
+        scene.units().response.in_metres(1.0),
+        scene.units().reference.in_metres(1.0)
     )
 }
 
 /// In what the result is not the requested one.
 pub(super) fn not_as_asked(result: &Comparison, scene: &Scene) -> impl Iterator<Item = String> {
     let lock = &result.lock;
-    let Units { factors: [_, factor], names: [_, (of_drive, unit)] } = Units::of(scene);
+    let [_, (of_drive, unit)] = channels(scene);
+    let symbol = unit.symbol;
     let ratio = lock.at.e_m / lock.requested_e_m;
     let another = (!lock.at_requested_drive).then(|| {
         format!(
-            "the result is at another drive than the requested one: {of_drive} {:.5e} ± {:.1e} {unit}, {ratio:.4} times the requested {:.5e} {unit}",
-            lock.at.e_m * factor,
-            lock.at.u_e_m * factor,
-            lock.requested_e_m * factor
+            "the result is at another drive than the requested one: {of_drive} {:.5e} ± {:.1e} {symbol}, {ratio:.4} times the requested {:.5e} {symbol}",
+            unit.of_metres(lock.at.e_m),
+            unit.of_metres(lock.at.u_e_m),
+            unit.of_metres(lock.requested_e_m)
         )
     });
     let moves = result.base_after_release.map(|[base, u]| {
         format!(
-            "there is no free decay: the drive was released, but the {of_drive} goes on with the drive's frequency, with at least {:.2e} ± {:.1e} {unit}, \
+            "there is no free decay: the drive was released, but the {of_drive} goes on with the drive's frequency, with at least {:.2e} ± {:.1e} {symbol}, \
              {:.1e} times the requested drive",
-            base * factor,
-            u * factor,
+            unit.of_metres(base),
+            unit.of_metres(u),
             base / lock.requested_e_m
         )
     });
@@ -495,20 +486,20 @@ fn remarks(point: &LevelPoint, mut motion: String, scene: &Scene) -> String {
 
 /// The measured points as a table, without a particle.
 fn measured(result: &TrackedComparison, scene: &Scene) -> String {
-    let units = Units::of(scene);
+    let units = scene.units();
     let rows = result.points.iter().map(|TrackedPoint { point, .. }| {
         let motion = remarks(point, point.regime.motion().into(), scene);
-        [&units.values(&point.at)[..], &effort(point), &[motion]].concat()
+        [&values(&units, &point.at)[..], &effort(point), &[motion]].concat()
     });
-    let [response, drive] = units.names.each_ref().map(|(name, unit)| format!("{name}, {unit}"));
+    let [response, drive] = channels(scene).map(|(name, unit)| format!("{name}, {}", unit.symbol));
     let headings = format!("frequency, Hz | {response} | {drive} | off target | periods | averaged | motion");
     Table::new(&headings).rows(rows).text()
 }
 
 /// Harmonics of what a shaker drives the structure with, as a table; empty without a shaker.
 fn drive_harmonics(result: &TrackedComparison, scene: &Scene) -> String {
-    let [(response, m), (drive, _)] = Units::of(scene).names;
-    let [per_response, _] = Units::of(scene).factors;
+    let [(response, unit), (drive, _)] = channels(scene);
+    let m = unit.symbol;
     let rows = result.points.iter().filter_map(|TrackedPoint { point, .. }| {
         let harmonics = point
             .drive_harmonics?
@@ -516,7 +507,7 @@ fn drive_harmonics(result: &TrackedComparison, scene: &Scene) -> String {
         let clipped = point.clipped_percent.map(|share| format!("{share:.1}"));
         let level = match result.reports_impacts() {
             true => format!("{:.4}", point.at.c),
-            false => format!("{:.4e}", point.at.a_m * per_response),
+            false => format!("{:.4e}", unit.of_metres(point.at.a_m)),
         };
         Some([level].into_iter().chain(harmonics).chain(clipped).collect::<Vec<_>>())
     });

@@ -106,7 +106,7 @@ impl Watch {
     pub(super) fn rig(&self, rig: Box<dyn Rig>) -> Box<dyn Rig> {
         let (sender, command, target, mut number) = (self.sender.clone(), Rc::clone(&self.command), self.target, 0);
         Tap::around(rig, move |mut sample, step| {
-            let drive = sample.command.drive;
+            let drive = target.drive(sample.command.drive);
             sample.command = Command { drive, ..command.get() };
             sample.sensors = target.scaled(sample.sensors);
             // The receiver polls, so that this wakes no thread. A full channel, or a server that has ended, drops the sample.

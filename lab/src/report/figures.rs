@@ -403,7 +403,7 @@ pub fn theory(p: &Dimensionless) -> Figure {
 /// The exact backbone of a structure beside that of its driven mode alone; frequencies and responses are those of the sensor.
 pub fn structure(scene: &Scene, survey: &Survey) -> Option<Figure> {
     let d = scene.dimensionless();
-    let unit = scene.structure.as_ref()?.reading_per_response().abs() * d.b;
+    let unit = scene.structure.as_ref()?.units().response.of_metres(d.b);
     let curves = |branches: &[StructureBranch]| -> Vec<Vec<Marked>> {
         let place = |orbit: &StructureOrbit| ((d.sigma(orbit.omega), orbit.response / unit), !orbit.is_unstable());
         branches

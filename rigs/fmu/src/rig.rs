@@ -72,9 +72,8 @@ pub struct Asked<'a> {
     pub starts: Vec<(&'static str, Value)>,
     /// Whether there is friction in the cavity, so that what it does is read.
     pub has_friction: bool,
-    /// Of a structure's driven mode: base displacement per unit of what drives the FMU and per unit of the reference, and displacement at the
-    /// sensor per displacement at the cavity.
-    pub of_driven_mode: Option<[f64; 3]>,
+    /// -1 where the response is this variable with the opposite sign, else 1.
+    pub direction: f64,
 }
 
 /// A plant FMU, stepped sample by sample.
@@ -100,9 +99,8 @@ pub struct FmuRig {
     /// Displacement of a force cell whose mass is compensated.
     cell: Option<Variable>,
     inside: Option<Inside>,
-    /// Of a structure's driven mode: base displacement per unit of what drives the FMU and per unit of the reference, and displacement at the
-    /// sensor per displacement at the cavity.
-    of_driven_mode: Option<[f64; 3]>,
+    /// -1 where the response is this variable with the opposite sign, else 1.
+    direction: f64,
 }
 
 /// The variables of the ground truth.
@@ -151,12 +149,8 @@ impl FmuRig {
             reference,
             cell,
             inside,
-            of_driven_mode: asked.of_driven_mode,
+            direction: asked.direction,
         })
-    }
-
-    fn per_drive(&self) -> f64 {
-        self.of_driven_mode.map_or(1.0, |[base, ..]| base)
     }
 
     /// What the bench uses, and what of it the FMU at `path` has.
@@ -189,19 +183,13 @@ impl ForceCell for FmuRig {
 
 impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        let response = self.fmu.get(self.response)?;
-        let reference = self.fmu.get_if(self.reference)?;
-        Ok(match self.of_driven_mode {
-            None => Sensors { response, reference },
-            Some([_, base, reading]) => Sensors {
-                response: response / reading,
-                reference: reference.map(|reference| reference * base),
-            },
+        Ok(Sensors {
+            response: self.direction * self.fmu.get(self.response)?,
+            reference: self.fmu.get_if(self.reference)?,
         })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let per_drive = self.per_drive();
         let Some(inputs) = self.inputs else {
             // The middle of the step: the mean of what is held is then in time.
             let displacement = drive.amplitude * (self.phase + 0.5 * drive.omega * step).sin();
@@ -209,13 +197,12 @@ impl Rig for FmuRig {
             return self.hold(Drive { displacement, ..drive }, step);
         };
         self.fmu.set(inputs[0], drive.omega)?;
-        self.fmu.set(inputs[1], drive.amplitude / per_drive)?;
+        self.fmu.set(inputs[1], drive.amplitude)?;
         Ok(self.fmu.step(step)?)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let displacement = drive.displacement / self.per_drive();
-        self.fmu.set(self.held.ok_or(RigError::NoHold)?, displacement)?;
+        self.fmu.set(self.held.ok_or(RigError::NoHold)?, drive.displacement)?;
         if let Some([_, amplitude]) = self.inputs {
             self.fmu.set(amplitude, 0.0)?;
         }

@@ -171,7 +171,10 @@ impl File<'_> {
         response: &Channel,
         notes: &mut Vec<String>,
     ) -> Result<Channel, RecordingError> {
-        let motions = Measurand::ALL.map(Measurand::unit);
+        let mut allowed = Measurand::ALL.map(Measurand::unit).to_vec();
+        if self.is_of_vines() {
+            allowed.push("N");
+        }
         match (&selection.drive, self.commanded(selection)?) {
             (None, Some(commanded)) => Ok(commanded),
             (None, None) if self.find("reference")?.is_none() => Ok(Channel {
@@ -180,7 +183,7 @@ impl File<'_> {
                 clock: response.clock,
                 ..Channel::default()
             }),
-            (given, _) => self.measured(given.as_deref().unwrap_or("reference"), "drive", &motions, notes),
+            (given, _) => self.measured(given.as_deref().unwrap_or("reference"), "drive", &allowed, notes),
         }
     }
 
@@ -287,9 +290,7 @@ impl File<'_> {
             )));
         };
         let of_file = unit::parse(stated, "").map_or("", |(_, unit)| unit);
-        // A recording of `vines` is in SI units.
-        let has = |name| self.find(name).is_ok_and(|one| one.is_some());
-        if !is_time && written.is_empty() && !(has("omega") && has("E")) {
+        if !is_time && written.is_empty() && !self.is_of_vines() {
             notes.push(format!("{}: channel {name} has no unit and is read in m", self.origin));
         } else if ![unit, "", "V"].contains(&of_file) {
             notes.push(format!(
@@ -305,6 +306,12 @@ impl File<'_> {
             clock: *clock,
             ..Channel::default()
         })
+    }
+
+    /// Whether this is a recording of `vines`, which is in SI units.
+    fn is_of_vines(&self) -> bool {
+        let has = |name| self.find(name).is_ok_and(|one| one.is_some());
+        has("omega") && has("E")
     }
 
     /// The base that a run of `vines` without a base sensor commanded: from its columns omega and E.

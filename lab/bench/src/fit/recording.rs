@@ -220,8 +220,9 @@ impl Recording {
             )));
         }
         for (channel, values) in [&mut one.response, &mut one.drive].into_iter().enumerate() {
-            let scale = knowledge.target.scale(channel);
-            values.iter_mut().for_each(|value| *value *= scale);
+            values
+                .iter_mut()
+                .for_each(|value| *value = knowledge.target.in_metres(channel, *value));
             remove_drift(values, (TAU / linear.omega0 / self.sample_time).round() as usize);
         }
         Ok(one)

@@ -530,6 +530,7 @@ mod tests {
             through_shaker: true,
             filter: None,
             delay: 0.0,
+            units: vines_scene::units::Units::OSCILLATOR,
             held: false,
         };
         for in_period in [100.03, 100.1, 100.3, 100.51, 100.97] {

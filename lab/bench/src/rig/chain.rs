@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::{Drive, Rig, RigError, RigStage, Sensors};
 use vines_scene::filter::LowPass;
-use vines_scene::scene::Scene;
+use vines_scene::scene::{Scene, Units};
 
 /// A rig behind its measurement chain.
 pub struct Chain {
@@ -70,18 +70,26 @@ impl Chain {
             filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
+        let Units { command, reference, response } = scene.units();
         let base_range = d.amplitude(settings.base_range);
         // The ranges of velocities and accelerations belong to the natural frequency.
-        let units = scene
+        let per_displacement = scene
             .resonance
             .measurands()
             .map(|measurand| d.omega0.powi(measurand.order()));
         Self {
             rig,
-            response: channel(settings.response_range * d.b * units[0], noise[0]),
-            base: settings.reference.then(|| channel(base_range * units[1], noise[1])),
+            response: channel(
+                response.of_metres(settings.response_range * d.b) * per_displacement[0],
+                noise[0],
+            ),
+            base: settings
+                .reference
+                .then(|| channel(reference.of_metres(base_range) * per_displacement[1], noise[1])),
             holds: settings.hold,
-            output: settings.dac_bits.map(|bits| Converter::new(bits, base_range)),
+            output: settings
+                .dac_bits
+                .map(|bits| Converter::new(bits, command.of_metres(base_range))),
             random: ChaCha8Rng::seed_from_u64(settings.seed),
             jitter: settings.jitter,
             late: 0.0,

@@ -41,7 +41,7 @@ pub enum SensorFault {
     Reversed,
     /// Saturates at half of the largest value before the fault, or so far if it begins with the motion.
     Saturated,
-    /// Reads the end of its range, 2 b.
+    /// Reads the end of its range, a displacement of 2 b.
     Stuck,
     /// Reads this many times the value.
     Gain(f64),
@@ -51,7 +51,7 @@ pub enum SensorFault {
     Noisy,
     /// Reads zero for five of every ten samples.
     Loose,
-    /// Reads this value, m.
+    /// Reads this value, in the unit of the channel.
     Value(f64),
     /// Reads the value of this many hundredths of a natural period ago.
     Late(usize),
@@ -113,9 +113,9 @@ struct Faulty {
     changed: Option<Box<dyn Rig>>,
     fault: RigFault,
     sample_time: f64,
-    /// End of the range of the sensors, m.
-    range: f64,
-    /// Largest value of the channel before the fault, m.
+    /// End of the ranges of response and base.
+    range: [f64; 2],
+    /// Largest value of the channel before the fault.
     before: Option<f64>,
     samples_per_period: f64,
     /// Samples that the rig was advanced before the fault begins, and until now.
@@ -123,7 +123,7 @@ struct Faulty {
     taken: usize,
     /// Samples until the last drive that was not zero.
     driven: usize,
-    /// Healthy readings of response and base, m, the newest last.
+    /// Healthy readings of response and base, the newest last.
     past: VecDeque<[f64; 2]>,
     random: ChaCha8Rng,
     ended: Box<dyn FnMut(Option<f64>)>,
@@ -154,13 +154,13 @@ pub fn faulty(
         Ok(Box::new(measured.compensating(Some(structure))))
     };
     let changed = (fault == RigFault::Structure).then(|| plant(STIFFER * scene.plant.stiffness));
-    let begins = (seconds / scene.sample_time()) as usize;
+    let (begins, units) = ((seconds / scene.sample_time()) as usize, scene.units());
     let rig = Faulty {
         rig: plant(scene.plant.stiffness)?,
         changed: changed.transpose()?,
         fault,
         sample_time: scene.sample_time(),
-        range: 2.0 * scene.plant.half_width,
+        range: [units.response, units.reference].map(|unit| unit.of_metres(2.0 * scene.plant.half_width)),
         before: None,
         samples_per_period: scene.controller.samples_per_period,
         begins,
@@ -206,7 +206,7 @@ impl Faulty {
                 };
                 value.clamp(-0.5 * level, 0.5 * level)
             }
-            SensorFault::Stuck => self.range,
+            SensorFault::Stuck => self.range[channel],
             SensorFault::Gain(gain) => gain * value,
             SensorFault::Offset => value + largest,
             SensorFault::Noisy => value + largest * std::f64::consts::FRAC_1_SQRT_2 * normal(&mut self.random),
@@ -217,7 +217,7 @@ impl Faulty {
         }
     }
 
-    /// Drives the rig for one sample: `asked`, m, is what is asked for.
+    /// Drives the rig for one sample: `asked` is what is asked for.
     fn drive(
         &mut self,
         asked: f64,

@@ -138,8 +138,9 @@ impl ReferenceControl {
             return Err(RigError::AmplifierLimit { times: self.times });
         }
         if self.contradicted > longest {
-            let [expected, read] = [expected, read].map(|value| value.norm() / self.path.base_per_reference);
-            let unit = ["m", "N"][usize::from(self.path.by_force)];
+            let unit = self.target.units.reference;
+            let [expected, read] = [expected, read].map(|value| unit.of_metres(value.norm()));
+            let unit = unit.symbol;
             return Err(RigError::PathContradicted { expected, read, periods: longest / TAU, unit });
         }
         if amplitude == 0.0 {

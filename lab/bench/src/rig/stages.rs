@@ -30,7 +30,7 @@ pub struct Measured<R> {
     now: Sensors,
     /// The readings before, the latest first, each with the time to the next one, s.
     before: [(Sensors, f64); 2],
-    /// Mass that is compensated behind a force cell, in the unit of the reference per m/s², and the displacement of the cell, m.
+    /// Mass that is compensated behind a force cell, kg, and the displacement of the cell, m.
     compensated: Option<(f64, Displacement<R>)>,
     /// Displacements of the cell, m: now and before.
     cell: [f64; 3],
@@ -56,8 +56,7 @@ impl<R: Rig> Measured<R> {
     where
         R: ForceCell,
     {
-        let mass = |structure: &Structure| structure.base_per_drive() * structure.compensated_mass();
-        let mass = structure.map(mass).filter(|mass| *mass > 0.0);
+        let mass = structure.map(Structure::compensated_mass).filter(|mass| *mass > 0.0);
         self.compensated = mass.map(|mass| (mass, R::cell_displacement as Displacement<R>));
         self
     }
@@ -121,13 +120,16 @@ impl<R: Rig> RigStage for Measured<R> {
             Reference::Force => force(three),
         };
         let base = first.reference.zip(middle.reference).zip(self.now.reference);
-        let inertia = self.compensated.map_or(0.0, |(mass, _)| {
-            let [now, middle, first] = self.cell;
-            mass * derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0)
-        });
+        let without_inertia = |force: f64| {
+            self.compensated.map_or(force, |(mass, _)| {
+                let [now, middle, first] = self.cell;
+                let acceleration = derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0);
+                mass.mul_add(-acceleration, force)
+            })
+        };
         Ok(Sensors {
             response: read(0, [first.response, middle.response, self.now.response]),
-            reference: base.map(|((first, middle), now)| of_base([first, middle, now]) - inertia),
+            reference: base.map(|((first, middle), now)| without_inertia(of_base([first, middle, now]))),
         })
     }
 
@@ -144,7 +146,8 @@ impl<R: Rig> RigStage for Measured<R> {
 
 // What the bench makes of the readings of a rig.
 
-/// A rig whose readings are in m, as [`Target::scaled`] says, and whose shaker, if there is one, is commanded so that it drives as asked.
+/// A rig in metres of the oscillator, as [`Target::scaled`] and [`Target::command`] say, whose shaker, if there is one, is commanded so that it drives as
+/// asked. Nearer to the rig all channels have their own units.
 pub struct Scaled<'a, R: ?Sized> {
     rig: &'a mut R,
     target: Target,
@@ -171,16 +174,18 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
         self.control.as_ref().map(|control| control.clipped)
     }
 
-    /// Amplitude of the last command of a shaker, m as the bench converts commands; `None` without a shaker.
+    /// Amplitude of the last command of a shaker, V; `None` without a shaker.
     pub fn shaker_command(&self) -> Option<f64> {
-        self.control.as_ref().map(|control| control.amplitude())
+        let control = self.control.as_ref()?;
+        Some(self.target.units.command.of_metres(control.amplitude()))
     }
 
     fn command(&mut self, drive: Drive, step: f64) -> Result<Drive, RigError> {
-        match &mut self.control {
-            Some(control) => control.command(self.readings, drive, step),
-            None => Ok(drive),
-        }
+        let drive = match &mut self.control {
+            Some(control) => control.command(self.readings, drive, step)?,
+            None => drive,
+        };
+        Ok(self.target.command(drive))
     }
 }
 

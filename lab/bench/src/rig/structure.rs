@@ -1,4 +1,4 @@
-//! A simulated structure as a rig, which measures the oscillator of its driven mode; with the limits of a shaker, and what fails.
+//! A simulated structure as a rig, with the limits of a shaker, and what fails.
 
 use lovines::{Parameters, Plant, Refused, Row, State, StructureState};
 use vines_model::Sensor;
@@ -6,18 +6,14 @@ use vines_model::Sensor;
 use super::{Clock, Drive, ForceCell, Rig, RigError, RigStage, Sensors, Simulated};
 use vines_scene::scene::{Excitation, Release, SceneShaker, Structure};
 
-/// A simulated structure. Its drive is the base displacement that moves the oscillator of the driven mode as the drive moves the mode, and its
-/// response the displacement of the driven mode at the cavity that the sensor would read: both m, and the loop, its limits and results are
-/// those of one oscillator.
+/// A simulated structure. It is driven with the displacement of its base, m, a force, N, or the command of its shaker, V. It reads the displacement at
+/// the sensor, m, and the displacement of the base or the force.
 #[derive(Clone)]
 pub struct SimulatedStructure {
     simulated: Simulated<lovines::Structure>,
     structure: Structure,
     /// The displacement at the sensor, by the sections.
     sensor: Row,
-    /// Base displacement per command, and displacement at the sensor per displacement at the cavity.
-    base_per_command: f64,
-    reading_per_response: f64,
     /// Largest command that the amplifier passes on, V.
     clipped_at: f64,
     /// What fails, and when, s.
@@ -51,8 +47,6 @@ impl SimulatedStructure {
         Ok(Self {
             simulated: Simulated { plant, sensor: Sensor::Q1, clock: Clock::default() },
             sensor: structure.response(),
-            base_per_command: structure.base_per_command(),
-            reading_per_response: structure.reading_per_response().abs(),
             structure: structure.clone(),
             clipped_at,
             fault: None,
@@ -190,17 +184,17 @@ impl SimulatedStructure {
         Ok(())
     }
 
-    /// The reference as a base displacement, m: the drive, the force cell or the table.
+    /// The reference, m or N: the drive, the force cell or the table.
     fn reference(&self) -> f64 {
         let plant = &self.simulated.plant;
         let Some(SceneShaker { rows, .. }) = &self.structure.shaker else {
-            return plant.base_displacement() * self.base_per_command;
+            return plant.base_displacement();
         };
         let row = match self.structure.excitation {
             Excitation::Base => &rows.end,
             Excitation::Force => &rows.force,
         };
-        self.structure.base_per_drive() * plant.point(row)[0]
+        plant.point(row)[0]
     }
 }
 
@@ -217,21 +211,16 @@ impl RigStage for SimulatedStructure {
     }
 
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        let [displacement, ..] = self.simulated.plant.point(&self.sensor);
-        Ok(Sensors {
-            response: displacement / self.reading_per_response,
-            reference: Some(self.reference()),
-        })
+        let [response, ..] = self.simulated.plant.point(&self.sensor);
+        Ok(Sensors { response, reference: Some(self.reference()) })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let amplitude = drive.amplitude / self.base_per_command;
-        self.step(lovines::Drive::harmonic(amplitude, drive.omega), step)
+        self.step(lovines::Drive::harmonic(drive.amplitude, drive.omega), step)
     }
 
     fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let [command, sample] =
-            [drive.amplitude.hypot(drive.displacement), drive.displacement].map(|value| value / self.base_per_command);
-        self.commanded(command, lovines::Drive::held(sample), step)
+        let command = drive.amplitude.hypot(drive.displacement);
+        self.commanded(command, lovines::Drive::held(drive.displacement), step)
     }
 }

@@ -91,10 +91,10 @@ fn published_modal_shakers_lock_on_the_exact_orbit() {
 fn a_lock_behind_a_shaker_states_its_force_in_newtons_and_its_command_in_volts() {
     let scene = preset(0, &[]).unwrap();
     let lock = identified(&scene).unwrap().lock;
-    let per_newton = scene.structure.as_ref().unwrap().base_per_drive();
+    let unit = scene.units().reference;
     let (force, u_force) = (lock.at.f_n.unwrap(), lock.at.u_f_n.unwrap());
-    assert!((force * per_newton / lock.at.e_m - 1.0).abs() < 1e-12);
-    assert!((u_force * per_newton / lock.at.u_e_m - 1.0).abs() < 1e-12);
+    assert!((unit.in_metres(force) / lock.at.e_m - 1.0).abs() < 1e-12);
+    assert!((unit.in_metres(u_force) / lock.at.u_e_m - 1.0).abs() < 1e-12);
     // The exact orbits of structure and shaker state both.
     let orbits = Survey::of(&scene).unwrap().orbits;
     let apart = |orbit: &StructureOrbit| (orbit.omega / (TAU * lock.at.f_hz) - 1.0).abs();
@@ -344,20 +344,19 @@ fn a_compensated_force_drives_the_structure_alone() {
 #[test]
 fn readings_behind_a_compensated_force_cell_are_those_of_the_structure_alone() {
     let scene = compensated("0.02").unwrap();
-    let structure = scene.structure.as_ref().unwrap();
     let omega = scene.dimensionless().omega0;
     let period = (TAU / omega / scene.sample_time()).round() as usize;
     let mut rig = Simulated::without_chain(&scene.clone().at_rest()).unwrap();
     let mut sums = [Complex::new(0.0, 0.0); 2];
     // The motion settles to 1e-13 in 800 periods.
     for n in 0..801 * period {
-        let drive = vines_bench::rig::Drive { omega, amplitude: 1e-5, displacement: 0.0 };
+        let drive = vines_bench::rig::Drive { omega, amplitude: 1.0, displacement: 0.0 };
         rig.advance(drive, TAU / omega / period as f64).unwrap();
         let Sensors { response, reference } = rig.sense().unwrap();
         if n >= 800 * period {
             let rotor = Complex::cis(-TAU * (n % period) as f64 / period as f64);
-            sums[0] += rotor * response * structure.reading_per_response().abs();
-            sums[1] += rotor * reference.unwrap() / structure.base_per_drive();
+            sums[0] += rotor * response;
+            sums[1] += rotor * reference.unwrap();
         }
     }
     let error = (sums[0] / sums[1] / receptance(&scene, omega)[0] - 1.0).norm();
@@ -396,7 +395,7 @@ fn measured_harmonics_of_the_force_are_those_of_the_exact_orbits_under_a_voltage
     let levels = [("C_to = 0.16 ", "C_to = 0.44 "), ("points = 18", "points = 3")];
     let scene = preset(0, &levels).unwrap();
     let exact = Survey::of(&scene).unwrap().behind_shaker;
-    let b = scene.plant.half_width * scene.structure.as_ref().unwrap().reading_per_response().abs();
+    let b = scene.units().response.of_metres(scene.plant.half_width);
     let points = tracked(Simulated::of(&scene).unwrap().as_mut(), &scene).unwrap().points;
     assert_eq!(points.len(), 3);
     for point in points {
@@ -526,11 +525,11 @@ fn a_limit_of_the_drive_behind_a_force_is_in_newtons_wherever_it_is_named() {
     let expected = "phase_lock.amplitude_max = 6 N: at least the drive of [excitation], 11.";
     assert!(refused.starts_with(expected) && refused.ends_with(" N"), "{refused}");
     let scene = limited("20.0").unwrap();
-    let (plan, structure) = (scene.plan(), scene.structure.as_ref().unwrap());
-    assert!((plan.lock.amplitude_max.unwrap() / structure.base_per_drive() - 20.0).abs() < 1e-9);
+    let (plan, unit) = (scene.plan(), scene.units().reference);
+    assert!((unit.of_metres(plan.lock.amplitude_max.unwrap()) - 20.0).abs() < 1e-9);
     let drive = vines_bench::rig::Drive {
         omega: scene.dimensionless().omega0,
-        amplitude: 20.0 * structure.base_per_drive(),
+        amplitude: unit.in_metres(20.0),
         displacement: 0.0,
     };
     let mut rig = Simulated::of(&scene).unwrap();
@@ -831,7 +830,8 @@ fn an_amplifier_that_controls_the_current_needs_the_voltage_for_it() {
     let scene = of("voltage_max = 4.0").unwrap();
     let mut rig = Simulated::of(&scene).unwrap();
     let (omega, step) = (scene.dimensionless().omega0, scene.sample_time());
-    let drive = vines_bench::rig::Drive { omega, amplitude: 10.0 * scene.amplitude, displacement: 0.0 };
+    let amplitude = scene.units().command.of_metres(10.0 * scene.amplitude);
+    let drive = vines_bench::rig::Drive { omega, amplitude, displacement: 0.0 };
     let error = (0..20_000).find_map(|_| rig.advance(drive, step).err());
     assert!(
         matches!(error, Some(RigError::ShakerLimit { name: "voltage", value, .. }) if value.abs() > 4.0),

@@ -10,7 +10,7 @@ use vines_bench::fit::{MeasuredPoint, contradiction};
 use vines_bench::identification::IdentificationError;
 use vines_bench::loop_check::{CheckedQuantity, Verdict, check};
 use vines_bench::rig::Simulated;
-use vines_bench::scene::{Excitation, Scene, SceneError, Structure};
+use vines_bench::scene::{Excitation, Scene, SceneError, Structure, Units};
 use vines_bench::survey::{Survey, phase_resonant, structure_backbone, without_other_modes};
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{Orbit, StructureOrbit};
@@ -158,12 +158,12 @@ fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
     // F at the drive and a base of the amplitude E, through spring and damper, move the mode alike; the sensor is at the drive unless it says otherwise.
     let stiffness = knowledge.linear.omega0.powi(2) * 1.0_f64.hypot(2.0 * 0.006) / 0.51252;
     assert!((scene.amplitude * stiffness / (0.1 * 1.2) - 1.0).abs() < 1e-14);
-    assert!((structure.reading_per_response() - 0.1 / 0.51252).abs() < 1e-15);
+    assert!((structure.units().response.of_metres(1.0) - 0.1 / 0.51252).abs() < 1e-15);
     let second = beam(&[("[excitation]", "mode = 2\nsensor = \"middle\"\n[excitation]")]);
     let second = second.unwrap();
     assert!((second.knowledge().linear.omega0 / (TAU * 55.274) - 1.0).abs() < 1e-14);
     // Cavity and drive move in opposite directions: the sensor's sign makes the resonance the same.
-    assert!(second.structure.unwrap().reading_per_response() > 0.0);
+    assert_eq!(second.structure.unwrap().direction(), 1.0);
 }
 
 #[test]
@@ -551,7 +551,8 @@ fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asy
 fn points_of_a_structure_are_compared_with_the_exact_orbit_of_their_response_not_with_a_polygon() {
     let scene = preset("frame", &[]);
     let (numbers, structure) = (scene.dimensionless(), scene.structure.as_ref().unwrap());
-    let [per_drive, per_response] = [structure.base_per_drive(), structure.reading_per_response().abs()];
+    let Units { reference, response, .. } = structure.units();
+    let [per_drive, per_response] = [reference.in_metres(1.0), response.of_metres(1.0)];
     let orbits = scene.structure_orbits().unwrap();
     let mut compared = 0;
     for n in 0..60 {

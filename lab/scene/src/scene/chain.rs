@@ -58,22 +58,22 @@ impl Scene {
         }
     }
 
-    /// Standard deviations of a sample of response and reference by the noise of their sensors, in the units in which a rig is read: the response as
-    /// that of the oscillator or driven mode, and a force as the base that makes it at omega0.
+    /// Standard deviations of a sample of response and reference by the noise of their sensors, in the units in which a rig is read: the force on an
+    /// oscillator as the base that makes it at omega0.
     pub fn noise(&self) -> [f64; 2] {
         let (chain, d) = (&self.chain, self.dimensionless());
         let ratio = chain.snr.map_or(0.0, |snr| FRAC_1_SQRT_2 * 10_f64.powf(-snr / 20.0));
-        let levels = [WORKING_LEVEL * d.b, self.amplitude];
-        let per_reading = match self.structure.as_ref() {
-            Some(structure) => [
-                structure.reading_per_response().abs().recip(),
-                structure.base_per_drive(),
-            ],
-            None if self.resonance.reference == Reference::Force => {
+        let units = self.units();
+        let levels = [
+            units.response.of_metres(WORKING_LEVEL * d.b),
+            units.reference.of_metres(self.amplitude),
+        ];
+        let per_reading = match self.resonance.reference {
+            Reference::Force if self.structure.is_none() => {
                 let static_force = self.plant.stiffness * Reference::Force.per_base(d.epsilon * d.lambda);
                 [1.0, static_force.recip()]
             }
-            None => [1.0; 2],
+            _ => [1.0; 2],
         };
         let measurands = self.resonance.measurands();
         let stated = [chain.response_noise, chain.reference_noise];

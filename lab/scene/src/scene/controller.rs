@@ -13,6 +13,7 @@ use vines_model::ArgumentError;
 
 use crate::knowledge::Knowledge;
 use crate::linear::LinearResponse;
+use crate::units::{Unit, Units};
 
 use super::checks::{Range, Row};
 use super::{Measurand, Scene, SceneError, given};
@@ -108,8 +109,8 @@ impl Scene {
         let period = knowledge.numbers.natural_period();
         let step = knowledge.sample_time;
         let delay = self.chain.total_delay(omega0 * step) / omega0;
-        let Units { drive, response, .. } = self.units();
-        let units = [drive.recip(), response.recip()];
+        let Units { reference, response, .. } = self.units();
+        let units = [reference, response];
         let defaults = Config {
             amplitude_max: Some((4.0 * self.drive_needed(knowledge)).min(self.drive_range())),
             response_max: Some(4.0 * knowledge.numbers.b),
@@ -154,16 +155,6 @@ impl Scene {
         }
     }
 
-    /// The units of limits: the controller of a structure works with the oscillator of its driven mode.
-    pub(crate) fn units(&self) -> Units {
-        let of_oscillator = Units { drive: 1.0, name: "m", response: 1.0 };
-        self.structure.as_ref().map_or(of_oscillator, |structure| Units {
-            drive: structure.base_per_drive().recip(),
-            name: structure.excitation.unit(),
-            response: structure.reading_per_response().abs(),
-        })
-    }
-
     /// Refuses a configuration that the controller refuses.
     ///
     /// # Errors
@@ -171,17 +162,21 @@ impl Scene {
     pub(crate) fn check_controller(&self) -> Result<(), SceneError> {
         let config = self.controller_config();
         let Err(error) = config.build() else { return Ok(()) };
-        let Units { drive, name, .. } = self.units();
+        let unit = self.units().reference;
         // Five digits: the value has been multiplied and divided.
-        let shown = |metres: f64| format!("{:.4e}", metres * drive).parse().unwrap_or(metres * drive);
+        let shown = |metres: f64| {
+            let value = unit.of_metres(metres);
+            format!("{value:.4e}").parse().unwrap_or(value)
+        };
         match config.amplitude_max {
             Some(limit) if error.name == "amplitude" => Err(SceneError::Value {
                 key: "phase_lock.amplitude_max",
                 value: shown(limit),
-                unit: name,
+                unit: unit.symbol,
                 allowed: format!(
-                    "at least the drive of [excitation], {} {name}",
-                    Number(shown(self.amplitude))
+                    "at least the drive of [excitation], {} {}",
+                    Number(shown(self.amplitude)),
+                    unit.symbol
                 ),
             }),
             _ => Err(error.into()),
@@ -257,7 +252,8 @@ impl Scene {
         });
         // An acceleration is averaged over a sample period.
         let shock = structure.host.velocity_per_impulse(&inertia).abs() / knowledge.sample_time;
-        10.0 * (changes.sum::<f64>() + shock) * impulse * structure.base_per_drive() / self.amplitude
+        let change = (changes.sum::<f64>() + shock) * impulse;
+        10.0 * structure.units().reference.in_metres(change) / self.amplitude
     }
 
     /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
@@ -298,17 +294,6 @@ impl Scene {
             ..config
         }
     }
-}
-
-/// In which units a scene gives limits: those of the drive and of the displacement at the sensor, where the bench has the metres of an oscillator.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Units {
-    /// Drive of the scene per metre of the bench.
-    pub drive: f64,
-    /// Unit of this drive, m or N.
-    pub name: &'static str,
-    /// Displacement at the sensor per metre of the bench.
-    pub response: f64,
 }
 
 /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
@@ -417,16 +402,16 @@ impl PhaseLock {
         self.0.iter().any(|(given, _)| *given == name)
     }
 
-    /// The configuration with these values; drives and responses are multiplied by the factors `units`.
-    fn apply(&self, [drive, response]: [f64; 2], mut config: Config) -> Config {
+    /// The configuration with these values; drives and responses are in these units.
+    fn apply(&self, [drive, response]: [Unit; 2], mut config: Config) -> Config {
         for (name, setting) in &self.0 {
-            let factor = match *name {
+            let unit = match *name {
                 "amplitude_max" | "ramp_rate" | "release_rate" => drive,
                 "response_max" => response,
-                _ => 1.0,
+                _ => Unit::METRE,
             };
             let setting = &match *setting {
-                Setting::Real(value) if value != NONE && factor != 1.0 => Setting::Real(value * factor),
+                Setting::Real(value) if value != NONE => Setting::Real(unit.in_metres(value)),
                 setting => setting,
             };
             // Names, types and whole numbers were checked when the scene was read; `Config::build` checks the rest.

@@ -30,7 +30,7 @@ impl Scene {
     pub fn structure_drive(&self) -> Option<f64> {
         self.structure
             .as_ref()
-            .map(|structure| self.amplitude / structure.base_per_drive())
+            .map(|structure| structure.units().reference.of_metres(self.amplitude))
     }
 
     /// The frequencies that the controller may set, rad/s.

@@ -11,7 +11,7 @@ use vines_model::Dimensionless;
 
 use super::checks::{Range, Row};
 use super::shaker::ShakerSection;
-use super::{Excitation, SceneError, Structure};
+use super::{Excitation, SceneError, Structure, Unit};
 
 /// The section as written: rows of the plant's table, or dimensionless numbers.
 #[derive(Debug, Clone, Default)]
@@ -270,8 +270,8 @@ impl ExcitationSection {
         d: &Dimensionless,
         structure: Option<&Structure>,
     ) -> Result<f64, SceneError> {
-        let (excitation, factor) = structure.map_or((Excitation::Base, 1.0), |structure| {
-            (structure.excitation, structure.base_per_drive())
+        let (excitation, unit) = structure.map_or((Excitation::Base, Unit::METRE), |structure| {
+            (structure.excitation, structure.units().reference)
         });
         let key = match excitation {
             Excitation::Base => "E (m)",
@@ -284,11 +284,11 @@ impl ExcitationSection {
             }
             (None, Some(e), None, Excitation::Base) => {
                 Row::new("excitation.E", e, "m", Range::NotNegative).check()?;
-                Ok(e * factor)
+                Ok(unit.in_metres(e))
             }
             (None, None, Some(f), Excitation::Force) => {
                 Row::new("excitation.F", f, "N", Range::NotNegative).check()?;
-                Ok(f * factor)
+                Ok(unit.in_metres(f))
             }
             (None, Some(_), None, _) | (None, None, Some(_), _) => Err(SceneError::text(
                 origin,

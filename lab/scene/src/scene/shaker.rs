@@ -175,7 +175,7 @@ impl Structure {
     /// m, that lags by a quarter of a period. The command and a force at the cavity, which the impacts are, make both at the natural frequency.
     pub fn beyond_limits(&self, amplitude: f64, response: f64) -> Option<String> {
         let shaker = self.shaker.as_ref()?;
-        let (omega, asked) = (self.mode().omega, amplitude / self.base_per_drive());
+        let (omega, asked) = (self.mode().omega, self.units().reference.of_metres(amplitude));
         let of = |row: &Row| {
             let by_command = self.host.frequency_response(row, omega);
             [by_command, self.host.frequency_response_to_cavity(row, omega)]
@@ -257,7 +257,7 @@ impl Structure {
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
     pub fn shaker_path(&self) -> Option<ShakerPath> {
         let (shaker, mode) = (self.shaker.as_ref()?, self.mode());
-        let damping_rate = mode.zeta * mode.omega;
+        let (damping_rate, units) = (mode.zeta * mode.omega, self.units());
         let values = frequencies(mode.omega, damping_rate).map(|omega| {
             let value = self.reference_by_command(shaker, omega) / shaker.reference_per_command;
             (omega, value)
@@ -266,19 +266,16 @@ impl Structure {
             gain: Complex64::ONE,
             pole: Complex64::ONE,
             damping_rate,
-            by_force: self.excitation == Excitation::Force,
-            largest: shaker.largest_command() * self.base_per_command(),
+            largest: units.command.in_metres(shaker.largest_command()),
             speed: 1.0,
-            base_per_reference: self.base_per_drive(),
-            base_per_command: self.base_per_command(),
             aliased: 0.0,
         };
         let path = path.fitted(mode.omega, damping_rate, &values);
         let response = self.response();
-        let per_response = self.base_per_command() * self.reading_per_response().abs();
+        let per_command = units.response.in_metres(units.command.of_metres(1.0));
         let exact = |omega: f64| {
             let reference = self.reference_by_command(shaker, omega) / shaker.reference_per_command;
-            [reference, self.host.frequency_response(&response, omega) / per_response]
+            [reference, self.host.frequency_response(&response, omega) * per_command]
         };
         let speed = speed(&path, mode.omega, exact);
         Some(ShakerPath { speed, ..path })

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::shaker::SceneShaker;
 use super::{Reference, SceneError};
+use crate::units::{Unit, Units};
 use files::{Matrix, Residues};
 
 /// What drives a structure.
@@ -130,10 +131,9 @@ impl Structure {
         mode.shape[self.cavity]
     }
 
-    /// The displacement that the response is, in the sections of the host: at the sensor, with the sign of
-    /// [`Self::reading_per_response`].
+    /// The displacement that the response is, in the sections of the host: at the sensor, in its [`Self::direction`].
     pub fn response(&self) -> Row {
-        let sign = self.reading_per_response().signum();
+        let sign = self.direction();
         self.rows[self.sensor]
             .iter()
             .map(|pair| pair.map(|value| sign * value))
@@ -237,20 +237,30 @@ impl Structure {
         (!masses.is_empty()).then(|| format!("masses mounted ({masses}) lower the modes by {lower} %"))
     }
 
-    /// Displacement of the base, m, that moves the driven mode's oscillator as one unit of the command does: the drive itself without a shaker.
-    pub fn base_per_command(&self) -> f64 {
-        let per_command = self.shaker.as_ref().map_or(1.0, |shaker| shaker.reference_per_command);
-        self.base_per_drive() * per_command
-    }
-
-    /// Displacement of the base, m, that moves the driven mode's oscillator as one unit of the drive does: 1 for one oscillator on a base.
-    pub fn base_per_drive(&self) -> f64 {
+    /// The units of its channels, in metres of the driven mode's oscillator: a drive is the displacement of the base that moves it alike, and a
+    /// response its displacement.
+    pub fn units(&self) -> Units {
         let mode = self.mode();
         let per_stiffness = match self.excitation {
             Excitation::Base => 1.0,
             Excitation::Force => mode.omega.powi(-2) / Reference::Force.per_base(2.0 * mode.zeta),
         };
-        (self.at_cavity(mode) * mode.drive).abs() * per_stiffness
+        let base = (self.at_cavity(mode) * mode.drive).abs() * per_stiffness;
+        let reference = Unit::of(self.excitation.unit(), base);
+        Units {
+            command: match &self.shaker {
+                Some(shaker) => Unit::of("V", base * shaker.reference_per_command),
+                None => reference,
+            },
+            reference,
+            response: Unit::per_metre("m", (mode.shape[self.sensor] / self.at_cavity(mode)).abs()),
+        }
+    }
+
+    /// The sign of the displacement at the sensor that is the response: in resonance it lags the drive, wherever cavity, drive and sensor are.
+    pub fn direction(&self) -> f64 {
+        let mode = self.mode();
+        (mode.shape[self.sensor] * mode.drive).signum()
     }
 
     /// All sections, and the driven mode with the opposite sign, each with the weights of its state in the response: per displacement of the base that
@@ -268,18 +278,11 @@ impl Structure {
             kick: [0.0; 2],
             cavity: [0.0; 2],
         };
-        let unit = self.reading_per_response().abs() * self.base_per_drive();
-        let rows = self.response().into_iter().map(|pair| pair.map(|weight| weight / unit));
+        let Units { reference, response, .. } = self.units();
+        let in_metres = |weight: f64| response.in_metres(reference.of_metres(weight));
+        let rows = self.response().into_iter().map(|pair| pair.map(in_metres));
         let sections = self.host.sections().iter().copied().zip(rows);
         sections.chain([(alone, [-1.0, 0.0])]).collect()
-    }
-
-    /// Displacement at the sensor per displacement at the cavity in the driven mode. Its sign is chosen so that the response in resonance lags
-    /// the drive, wherever cavity, drive and sensor are.
-    pub fn reading_per_response(&self) -> f64 {
-        let mode = self.mode();
-        let sign = (mode.shape[self.sensor] * mode.drive).signum();
-        sign * (mode.shape[self.sensor] / self.at_cavity(mode)).abs()
     }
 }
 

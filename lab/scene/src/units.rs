@@ -1,0 +1,55 @@
+//! The units of a rig's channels, and what one unit is in the metres of the oscillator that loop, theory and exact orbits are those of.
+
+/// The unit of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// Its symbol: m, N or V.
+    pub symbol: &'static str,
+    /// So many units are so many metres of the oscillator: of the two, one is 1, so that conversions round once.
+    ratio: [f64; 2],
+}
+
+impl Unit {
+    /// The metre of the oscillator.
+    pub const METRE: Self = Self { symbol: "m", ratio: [1.0; 2] };
+
+    /// A unit of which one is so many metres of the oscillator.
+    pub fn of(symbol: &'static str, metres: f64) -> Self {
+        Self { symbol, ratio: [1.0, metres] }
+    }
+
+    /// A unit of which so many are a metre of the oscillator.
+    pub fn per_metre(symbol: &'static str, units: f64) -> Self {
+        Self { symbol, ratio: [units, 1.0] }
+    }
+
+    /// A value in this unit, in metres of the oscillator.
+    pub fn in_metres(self, value: f64) -> f64 {
+        value * self.ratio[1] / self.ratio[0]
+    }
+
+    /// Metres of the oscillator, in this unit.
+    pub fn of_metres(self, metres: f64) -> f64 {
+        metres * self.ratio[0] / self.ratio[1]
+    }
+}
+
+/// The units of what a rig takes and of what its sensors read. Velocities and accelerations have those of the displacement, per s and s².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// What the rig is driven with: the reference, or V of a shaker.
+    pub command: Unit,
+    /// The reference, in which a scene states its drive: the displacement of a base, or a force.
+    pub reference: Unit,
+    /// The response: a displacement at the sensor.
+    pub response: Unit,
+}
+
+impl Units {
+    /// Those of one oscillator.
+    pub const OSCILLATOR: Self = Self {
+        command: Unit::METRE,
+        reference: Unit::METRE,
+        response: Unit::METRE,
+    };
+}
