@@ -1,4 +1,4 @@
-"""No file of these folders depends on one that depends on it, so that a reader can begin at the bottom; a rig is a crate of its own."""
+"""Files depend on each other without a circle, so that a reader begins at the bottom; a rig is a crate of its own."""
 
 import re
 import tomllib

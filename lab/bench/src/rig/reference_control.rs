@@ -16,7 +16,7 @@ use vines_scene::knowledge::{Knowledge, Target};
 use vines_scene::shaker_path::{BANDWIDTH, DETECTOR, OBSERVER, ODD_HARMONICS, SECOND, ShakerPath, rate_of};
 
 /// Largest difference between both, as a share of what the command makes of a structure that does not move: of the reference, this share over the
-/// drop-out, and at most all but this share. An amplifier that clips at half of the command loses 0.39 of it, a broken stinger all.
+/// drop-out, and at most all of it. An amplifier that clips at half of the command loses 0.39 of it, a broken stinger all.
 const LOST_SHARE: f64 = 0.25;
 /// Phase for which such a difference lasts, rad: in this time the control halves an error. Impacts and drive change the reference all the time while the
 /// controller searches, where little of it is left.
@@ -128,7 +128,7 @@ impl ReferenceControl {
         let error = self.error.phasors[0] * displacement;
         let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
         let [expected, read] = [self.path.gain * self.command - moved, self.asked - error];
-        let largest = self.asked * (LOST_SHARE / self.path.drop_out()).min(1.0 - LOST_SHARE);
+        let largest = self.asked * (LOST_SHARE / self.path.drop_out()).min(1.0);
         let is_driven = self.asked > 0.0 && amplitude > 0.0;
         let longer = |phase: f64, is: bool| if is && is_driven { phase + omega * step } else { 0.0 };
         self.limited = longer(self.limited, self.times > 1.0);

@@ -68,7 +68,16 @@ fn noise_of(scene: &Scene) -> Vec<[f64; 2]> {
     let [mut noisy, mut clean] = [Simulated::of(scene), Simulated::without_chain(scene)].map(Result::unwrap);
     let omega = scene.dimensionless().omega0;
     let stretch = |share: f64| {
-        let drive = Drive { omega, amplitude: share * scene.amplitude, displacement: 0.0 };
+        let drive = Drive {
+            omega,
+            amplitude: scene
+                .knowledge()
+                .target
+                .units
+                .command
+                .of_metres(share * scene.amplitude),
+            displacement: 0.0,
+        };
         let mut squares = [0.0; 2];
         for _ in 0..SAMPLES {
             let [one, other] = [&mut noisy, &mut clean].map(|rig| {
@@ -116,9 +125,9 @@ fn the_noise_of_a_sensor_is_the_same_at_rest_at_a_hundredth_of_the_drive_at_the_
     are(&noise_of(&paper(&["chain.snr=60"])), [2.828e-6, 7.071e-4 * drive]);
     let by_force = paper(&["chain.snr=40", "resonance.reference=force"]);
     are(&noise_of(&by_force), [2.828e-5, 7.071e-3 * drive]);
-    // Behind the force on a structure: the requested force.
+    // Behind the force of 1.2 N on a structure, whose sensor reads a third of the motion at the cavity.
     let structure = common::scene(FORCED, &["chain.snr=40"]).unwrap();
-    are(&noise_of(&structure), [2.828e-5, 7.071e-3 * structure.amplitude]);
+    are(&noise_of(&structure), [2.828e-5 / 3.0, 7.071e-3 * 1.2]);
 }
 
 /// A beam under a force, whose sensor reads a third of the motion at the cavity.
@@ -164,10 +173,10 @@ fn keys_in_si_units_replace_the_noise_of_their_channel_whatever_it_measures() {
     // N. The force of 1 m of the base is k (1 + (2 zeta)²)^(1/2) at omega0, with 2 zeta = 0.012.
     let by_force = ["resonance.reference=force", "chain.reference_noise=0.02"];
     are(&noisy(&by_force), [0.0, 0.02 / 11_680.84]);
-    // The sensor of the structure reads a third of the motion at the cavity.
+    // As stated, in the units of the channels of a structure.
     let settings = ["chain.response_noise=1e-5", "chain.reference_noise=0.02"];
     let structure = common::scene(FORCED, &settings).unwrap();
-    are(&noise_of(&structure), [3e-5, 0.02 / 1.2 * structure.amplitude]);
+    are(&noise_of(&structure), [1e-5, 0.02]);
 }
 
 /// The lock behind the chain of a scene, held for 200 periods.
