@@ -62,14 +62,15 @@ fn the_fmu_of_a_structure_has_the_bits_of_the_simulated_one() {
         fs::write(&path, content).unwrap();
         let mut fmu = fmu_rig::load(&path, &scene).unwrap();
         let mut own = Simulated::without_chain(&scene).unwrap();
+        let amplitude = scene.knowledge().target.units.command.of_metres(scene.amplitude);
         for n in 0..3000_u32 {
             assert_eq!(fmu.sense().unwrap(), own.sense().unwrap(), "{preset}, sample {n}");
             let [of_fmu, of_own] = [fmu.ground_truth(), own.ground_truth()];
             assert_eq!(of_fmu.unwrap(), of_own.unwrap(), "{preset}, sample {n}");
             let drive = Drive {
                 omega: (0.99 + f64::from(n % 5) / 500.0) * scene.dimensionless().omega0,
-                amplitude: 3.0 * scene.amplitude,
-                displacement: scene.amplitude * f64::from(n % 3),
+                amplitude: 3.0 * amplitude,
+                displacement: amplitude * f64::from(n % 3),
             };
             for rig in [&mut fmu as &mut dyn Rig, own.as_mut()] {
                 // Both ways in which a loop drives a rig.
