@@ -189,24 +189,25 @@ impl<R: Rig> Rig for Reachable<R> {
 }
 
 impl Brake {
-    /// Commands zero, as the last command was given.
+    /// Commands zero, as the last command was given. A zero counts when the rig has answered.
     fn zero(self) -> Zeroed {
         let last = *lock(&self.last);
-        if last == Last::Zero {
-            return Zeroed::Yes;
-        }
         let Some(rig) = self.rig.upgrade() else {
-            return Zeroed::No("the rig has failed".into());
+            return match last {
+                Last::Zero => Zeroed::Yes,
+                _ => Zeroed::No("the rig has failed".into()),
+            };
         };
         // A call that never returns holds the lock, and then the caller does not wait for this.
         let mut rig = lock(&rig);
         let zero = Drive::default();
         let commanded = match last {
+            Last::Zero => Ok(()),
             Last::Held => rig.hold(zero, self.sample_time),
             _ => rig.advance(zero, self.sample_time),
         };
-        match commanded {
-            Ok(()) => Zeroed::Yes,
+        match commanded.and_then(|()| rig.sense()) {
+            Ok(_) => Zeroed::Yes,
             Err(error) => Zeroed::No(error.to_string()),
         }
     }

@@ -264,6 +264,8 @@ impl RigStage for Stoppable {
         let sensors = self.rig.sense()?;
         if self.stop.load(Ordering::Relaxed) {
             self.rig.advance(Drive::default(), self.sample_time)?;
+            // A zero that the rig has not answered may not have arrived.
+            self.rig.sense()?;
             return Err(RigError::Failed(Interrupted.into()));
         }
         Ok(sensors)
