@@ -485,6 +485,7 @@ fn recording(read: &[Sensors], sample_time: f64) -> Recording {
         channels: ["response".into(), "reference".into()],
         start: 0.0,
         measurands: Default::default(),
+        of_force: false,
         notes: Vec::new(),
         sample_time,
         response: read.iter().map(|one| one.response).collect(),

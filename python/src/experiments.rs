@@ -177,6 +177,9 @@ pub fn fit(
     }))
 }
 
+/// What a drive measures that is no motion.
+const FORCE: &str = "force";
+
 /// A recording: origin, names of the channels, start and step (s), what both measure, response, base, and notes.
 type RecordingTuple = (
     String,
@@ -208,15 +211,18 @@ pub fn recording(
         start,
         sample_time,
         measurands,
+        of_force,
         response,
         drive,
         notes,
     } = calculate(py, read)?.map_err(invalid)?;
+    let [of_response, of_drive] = measurands.map(Measurand::name);
+    let measured = [of_response, if of_force { FORCE } else { of_drive }];
     Ok((
         origin,
         channels,
         [start, sample_time],
-        measurands.map(|measurand| measurand.name().into()),
+        measured.map(Into::into),
         response,
         drive,
         notes,
@@ -226,21 +232,28 @@ pub fn recording(
 fn recording_of(
     (origin, channels, [start, sample_time], measured, response, drive, notes): RecordingTuple,
 ) -> PyResult<Recording> {
-    let measurand = |name: &String| {
+    let of_force = measured[1] == FORCE;
+    let measurand = |name: &str| {
         let mut every = Measurand::ALL.into_iter();
         every.find(|one| one.name() == name).ok_or_else(|| {
             PyValueError::new_err(format!(
-                "{origin}: measured {name} is unknown; displacement, velocity and acceleration are known"
+                "{origin}: measured {name} is unknown; displacement, velocity and acceleration are known, and of the drive force"
             ))
         })
     };
-    let measurands = [measurand(&measured[0])?, measurand(&measured[1])?];
+    let of_drive = if of_force {
+        Measurand::default()
+    } else {
+        measurand(&measured[1])?
+    };
+    let measurands = [measurand(&measured[0])?, of_drive];
     Ok(Recording {
         origin,
         channels,
         start,
         sample_time,
         measurands,
+        of_force,
         response,
         drive,
         notes,

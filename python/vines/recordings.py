@@ -42,11 +42,11 @@ class Recording:
     sample_time : float
         Time from sample to sample, s.
     response, drive : ndarray
-        Response and base, m, m/s or m/s².
+        Response and base, m, m/s or m/s²; a force in N.
     start : float
         Time of the first sample, s.
     measured : tuple of str
-        What response and base are: "displacement", "velocity" or "acceleration".
+        What response and base are: "displacement", "velocity" or "acceleration"; the drive may be a "force".
     notes : tuple of str
         What is to be known of the way it was read: the clock, and what was cut or interpolated.
 
@@ -66,7 +66,7 @@ class Recording:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        kinds = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²"}
+        kinds = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²", "force": "N"}
         for name, kind in zip(("response", "drive"), self.measured, strict=True):
             values = reals(name, getattr(self, name), kinds.get(kind, "1"), missing=True)
             object.__setattr__(self, name, values.ravel())

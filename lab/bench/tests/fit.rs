@@ -344,6 +344,7 @@ fn recorded_on(rig: Parameters, settings: &str) -> Recording {
         channels: ["y".into(), "x".into()],
         start: 0.0,
         measurands: scene.resonance.measurands(),
+        of_force: false,
         notes: Vec::new(),
         sample_time: scene.sample_time(),
         response: kept.iter().map(|one| one.response).collect(),
@@ -871,6 +872,46 @@ fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_
         }
     }
     assert_eq!(recording().linear_decay(&scene.knowledge()).unwrap(), None);
+}
+
+#[test]
+fn a_force_is_not_read_as_the_motion_of_a_base_nor_a_motion_as_a_force() {
+    let base = wrong_scene();
+    let cantilever = include_str!("../../../scenes/shaker-cantilever.toml");
+    let forced = Scene::parse("shaker-cantilever.toml", cantilever, &[]).unwrap();
+    let text = |unit: &str| {
+        let row = |n: u32| {
+            let time = f64::from(n) * 1e-3;
+            format!(
+                "{time},{},{},55,1e-4\n",
+                1e-3 * (55.0 * time).sin(),
+                1e-4 * (55.0 * time).cos()
+            )
+        };
+        let rows: String = (0..4000).map(row).collect();
+        format!("time,response,reference{unit},omega,E\n{rows}")
+    };
+    let read = |unit: &str| {
+        let contents = plain_table("run.csv", text(unit).as_bytes()).unwrap();
+        Recording::of(&contents, &Selection::default()).unwrap()
+    };
+    let [force, motion] = ["[N]", ""].map(|unit| read(&format!(" {unit}")));
+    assert!(force.of_force && !motion.of_force);
+    for (recording, scene, said) in [
+        (
+            &force,
+            &base,
+            "is a force, N, and the structure of the scene is driven by the motion of a base",
+        ),
+        (
+            &motion,
+            &forced,
+            "is the motion of a base, and the structure of the scene is driven by a force, N",
+        ),
+    ] {
+        let error = recording.prepared(&scene.knowledge()).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
 }
 
 #[test]

@@ -157,6 +157,7 @@ impl File<'_> {
             channels: [response.name, drive.name],
             start: start + begins as f64 * sample_time,
             sample_time,
+            of_force: drive.unit == "N",
             measurands: [response.unit, drive.unit].map(|unit| Measurand::of_unit(&unit).unwrap_or_default()),
             response: response.values,
             drive: drive.values,
@@ -326,6 +327,15 @@ impl File<'_> {
         let Some(time) = self.time(selection, &mut Vec::new())? else {
             return Ok(None);
         };
+        let unit = match &*amplitude.unit {
+            "" | "m" => "m",
+            "N" => "N",
+            other => {
+                return Err(self.refused(&format!(
+                    " has no reference, and its command E is in {other}: what drives the structure was not recorded"
+                )));
+            }
+        };
         let step = Clock::of(&time.values).step;
         let (mut phase, mut before) = (0.0, amplitude.values.first().copied().unwrap_or(0.0));
         let base = omega.values.iter().zip(&amplitude.values).map(|(omega, amplitude)| {
@@ -335,7 +345,7 @@ impl File<'_> {
         });
         Ok(Some(Channel {
             name: "E".into(),
-            unit: "m".into(),
+            unit: unit.into(),
             values: base.collect(),
             ..Channel::default()
         }))

@@ -45,9 +45,11 @@ pub struct Recording {
     pub sample_time: f64,
     /// What response and base measure.
     pub measurands: [Measurand; 2],
+    /// Whether the drive is a force, not the motion of a base.
+    pub of_force: bool,
     /// Response, m, m/s or m/s².
     pub response: Vec<f64>,
-    /// Motion of the base, m, m/s or m/s²; zeros without a channel of the base, whose name is empty then.
+    /// Motion of the base, m, m/s or m/s², or force, N; zeros without a channel of the base, whose name is empty then.
     pub drive: Vec<f64>,
     /// What is to be known of the way it was read: the clock, and what was cut or interpolated.
     pub notes: Vec<String>,
@@ -217,6 +219,17 @@ impl Recording {
             return Err(RecordingError(format!(
                 "{origin}: the response {response} measures {name}, and the scene's sensor reads v, which contains the particle: no sensor on the structure \
                  does; set resonance.sensor = \"q1\" in the scene, or with --set"
+            )));
+        }
+        let by_force = knowledge.target.units.reference.symbol == "N";
+        if self.of_force != by_force && self.drive_is_named() {
+            let what = |is_force| if is_force { "a force, N" } else { "the motion of a base" };
+            return Err(RecordingError(format!(
+                "{}: the drive {} is {}, and the structure of the scene is driven by {}; give the scene that was recorded",
+                self.origin,
+                self.channels[1],
+                what(self.of_force),
+                what(by_force)
             )));
         }
         for (channel, values) in [&mut one.response, &mut one.drive].into_iter().enumerate() {
