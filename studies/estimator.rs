@@ -23,7 +23,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use vines_estimate::CubicSpline;
-use vines_identify::{Identified, Samples, Scene as Numbers, identify};
+use vines_identify::{IdealRig, Identified, Samples, identify};
 use vines_model::Sensor;
 
 /// Samples of a period.
@@ -32,8 +32,8 @@ const SAMPLES: f64 = 100.0;
 /// A rig, what is known of it, and the seed of its noise.
 #[derive(Debug, Clone, Copy)]
 struct Rig {
-    truth: Numbers,
-    scene: Numbers,
+    truth: IdealRig,
+    scene: IdealRig,
     seed: u64,
 }
 
@@ -48,14 +48,14 @@ struct Recorded {
 fn drawn(uniform: Uniform, n: usize) -> Rig {
     let mut logarithmic = |low: f64, high: f64| uniform(low.ln(), high.ln()).exp();
     let [f0, epsilon, b] = [[2.0, 80.0], [0.003, 0.03], [0.002, 0.02]].map(|[low, high]| logarithmic(low, high));
-    let truth = Numbers {
+    let truth = IdealRig {
         f0,
         zeta: 0.5 * epsilon * uniform(0.4, 2.5),
         r: uniform(0.35, 0.85),
         b,
         epsilon,
     };
-    let scene = Numbers {
+    let scene = IdealRig {
         f0: f0 * (1.0 + uniform(-0.01, 0.01)),
         zeta: truth.zeta * (1.0 + uniform(-0.25, 0.25)),
         r: (truth.r + uniform(-0.15, 0.15)).clamp(0.2, 0.95),
@@ -66,7 +66,7 @@ fn drawn(uniform: Uniform, n: usize) -> Rig {
 }
 
 /// Responses that are asked for, over b, period by period; 0: the base is at rest.
-fn schedule(kind: &str, rig: &Numbers) -> Result<Vec<f64>, Failure> {
+fn schedule(kind: &str, rig: &IdealRig) -> Result<Vec<f64>, Failure> {
     let ratio = (1.0 - rig.r) / (1.0 + rig.r);
     let fold = ratio / ratio.hypot(FRAC_PI_2);
     // Below the loss of symmetry at B = 1.07.
@@ -125,7 +125,7 @@ fn cubic([[x0, v0], [x1, v1]]: [[f64; 2]; 2], h: f64) -> Drive {
 
 /// Records a rig: once in a period the loops change frequency and amplitude of the base.
 fn recorded(rig: &Rig, kind: &str, snr: f64) -> Result<Recorded, Failure> {
-    let Numbers { f0, zeta, r, b, epsilon } = rig.truth;
+    let IdealRig { f0, zeta, r, b, epsilon } = rig.truth;
     let (omega0, h) = (TAU * f0, 1.0 / (f0 * SAMPLES));
     let parameters = Parameters {
         primary_mass: 1.0,
@@ -202,7 +202,7 @@ impl Recorded {
 }
 
 /// Errors over uncertainties of the curve, drive then frequency, and median uncertainties over `b epsilon` and epsilon.
-fn of_curve(truth: &Numbers, found: &Identified) -> Option<([Vec<f64>; 2], [f64; 2])> {
+fn of_curve(truth: &IdealRig, found: &Identified) -> Option<([Vec<f64>; 2], [f64; 2])> {
     let exact = truth.backbone(Sensor::Q1);
     let logarithms: Vec<f64> = exact.iter().map(|point| point[0].ln()).collect();
     let [low, high] = found.curve.basis.ends;

@@ -14,16 +14,16 @@ use crate::search::simplex;
 const FUNCTIONS: usize = 23;
 /// Standard uncertainty of the factor of an element's lag, of each component: closed forms of first order are that good. Mixtures at 75 dB have
 /// 1.00 ± 0.01.
-const LAG: f64 = 0.02;
+const U_LAG: f64 = 0.02;
 /// Information on u at the start: none, but for rounding.
-const START: f64 = 1e-30;
+const START_INFORMATION: f64 = 1e-30;
 /// Uncertainty of the curvature of an element's own force, relative: what the uncertainties of a drawing move it by.
 const SHAPE: f64 = 0.25;
 /// Rounds of path, lag and variances.
-const ROUNDS: usize = 3;
+const PATH_ROUNDS: usize = 3;
 /// Limits of the three: 1 % to all of what is beyond the lag, as an amplitude; any curvature of S; noise from half to
 /// four times the measured one, as an amplitude.
-const LIMITS: [[f64; 2]; 3] = [[1e-4, 1.0], [1e-5, 30.0], [0.2, 20.0]];
+const VARIANCE_LIMITS: [[f64; 2]; 3] = [[1e-4, 1.0], [1e-5, 30.0], [0.2, 20.0]];
 
 /// Share of the force beyond its lag, roughness of S over the scale of the force, and noise of the response over the measured one.
 pub type Hyper = [f64; 3];
@@ -140,9 +140,9 @@ impl<'a> Estimate<'a> {
         let m = self.basis.size;
         let (mut normal, mut known) = (information.clone(), right.column(0).into_owned());
         for (part, change) in [1.0 - self.lag.re, -self.lag.im].into_iter().enumerate() {
-            normal[(2 * m + part, 2 * m + part)] += LAG.powi(-2);
-            known[2 * m + part] += change * LAG.powi(-2);
-            normal[(2 * m + 2 + part, 2 * m + 2 + part)] += START;
+            normal[(2 * m + part, 2 * m + part)] += U_LAG.powi(-2);
+            known[2 * m + part] += change * U_LAG.powi(-2);
+            normal[(2 * m + 2 + part, 2 * m + 2 + part)] += START_INFORMATION;
         }
         let right = known.clone();
         let constant = self.expect(&mut normal, &mut known, hyper[1]);
@@ -186,8 +186,8 @@ impl<'a> Estimate<'a> {
 
     /// Maximum likelihood of the three variances; path and lag follow in between.
     pub fn fit(mut self) -> Option<(Self, Solution)> {
-        for round in 0..ROUNDS {
-            let mut limits = LIMITS;
+        for round in 0..PATH_ROUNDS {
+            let mut limits = VARIANCE_LIMITS;
             limits[1][0] = limits[1][0].max(self.least);
             let inside =
                 |p: &[f64; 3]| -> Hyper { std::array::from_fn(|i| p[i].exp().clamp(limits[i][0], limits[i][1])) };
@@ -206,7 +206,7 @@ impl<'a> Estimate<'a> {
             let unknowns = complex(&solution.unknowns);
             let (m, lag) = (self.basis.size, self.lag);
             self.coefficients.copy_from_slice(&unknowns[..m]);
-            if round + 1 == ROUNDS {
+            if round + 1 == PATH_ROUNDS {
                 return Some((self, solution));
             }
             let path = self.smooth(self.hyper, &solution);

@@ -8,19 +8,19 @@ use crate::record::Record;
 /// What a few periods say of the force. Forces are relative to the phase of the response.
 #[derive(Debug, Clone)]
 pub struct Window {
-    /// Number of its first period, and of the period after its last one.
+    /// Numbers of its first period and of the period after its last one.
     pub periods: [usize; 2],
-    /// Mean force, m of the base, and its variance by noise (mean square), m².
+    /// Mean force, m of the base.
     pub force: Complex64,
-    /// Its variance.
+    /// Variance of the mean force by noise, m² (mean square).
     pub variance: f64,
     /// Mean amplitude of the response, m.
     pub amplitude: f64,
     /// Growth of the logarithm of the amplitude in a period.
     pub rate: f64,
-    /// Mean force at twice the frequency, and its variance.
+    /// Mean force at twice the frequency, m of the base.
     pub even: Complex64,
-    /// Its variance.
+    /// Variance of the mean force at twice the frequency, m².
     pub even_variance: f64,
 }
 

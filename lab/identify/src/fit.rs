@@ -7,9 +7,9 @@ use vines_estimate::{Curve, Estimate, Record, Window};
 use vines_model::Sensor;
 use vines_model::numerics::{LeastSquares, Misfit};
 
+use crate::ideal_rig::IdealRig;
 use crate::particle::Particle;
 use crate::regime::{Expected, TOLERANCES, one_to_one, rough_scene};
-use crate::scene::Scene;
 
 /// The response is sampled at equal times, s, together with the base.
 #[derive(Debug, Clone, Copy)]
@@ -28,12 +28,12 @@ pub struct Samples<'a> {
 #[derive(Debug, Clone)]
 pub struct Identified {
     /// The parameters.
-    pub scene: Scene,
+    pub scene: IdealRig,
     /// Their standard uncertainties.
     pub uncertainty: [f64; 5],
     /// Drive and frequency of phase resonance, without the model of a cavity.
     pub curve: Curve,
-    /// Sum of squares of what the record contradicts, and its degrees of freedom.
+    /// Chi-square of the ideal cavity for the information of the curve.
     pub chi_square: f64,
     /// Its degrees of freedom.
     pub degrees: usize,
@@ -47,7 +47,7 @@ pub struct Identified {
     pub lag: Complex64,
     /// Innovations, of variance 1 if the model holds.
     pub innovations: Vec<f64>,
-    /// Passes, and whether the linear response stayed.
+    /// Number of passes.
     pub passes: usize,
     /// Whether the linear response stayed.
     pub converged: bool,
@@ -65,11 +65,11 @@ const PASSES: usize = 6;
 /// Change of f0 and zeta, in standard uncertainties, below which another pass changes nothing.
 const STILL: f64 = 0.1;
 /// Fewest periods: with fewer the curve is the prior's.
-const FEWEST: usize = 30;
+const FEWEST_PERIODS: usize = 30;
 /// Gain of a further step, relative to one and chi-square, at which the minimum counts as found.
-const FOUND: f64 = 1e-6;
+const LEAST_GAIN: f64 = 1e-6;
 /// Step of a central difference, relative.
-const STEP: f64 = 1e-6;
+const DIFFERENCE_STEP: f64 = 1e-6;
 
 /// A least-squares model without traces.
 struct Model<F>(F);
@@ -84,7 +84,7 @@ impl<const N: usize, F: Fn(&SVector<f64, N>) -> Option<Vec<f64>>> Misfit<N> for 
     fn derivatives(&self, x: &SVector<f64, N>, (): &()) -> Option<Vec<SVector<f64, N>>> {
         let mut columns = Vec::new();
         for i in 0..N {
-            let [above, below] = [STEP, -STEP].map(|step| {
+            let [above, below] = [DIFFERENCE_STEP, -DIFFERENCE_STEP].map(|step| {
                 let mut moved = *x;
                 moved[i] += step;
                 (self.0)(&moved)
@@ -94,7 +94,7 @@ impl<const N: usize, F: Fn(&SVector<f64, N>) -> Option<Vec<f64>>> Misfit<N> for 
                 above
                     .iter()
                     .zip(&below)
-                    .map(|(a, b)| (a - b) / (2.0 * STEP))
+                    .map(|(a, b)| (a - b) / (2.0 * DIFFERENCE_STEP))
                     .collect::<Vec<f64>>(),
             );
         }
@@ -105,29 +105,29 @@ impl<const N: usize, F: Fn(&SVector<f64, N>) -> Option<Vec<f64>>> Misfit<N> for 
 
 /// Parameters, uncertainties and chi-square of the cavity that fits the information of a curve, with the scene as a prior: without it a short noisy
 /// decay runs away.
-fn fit(curve: &Curve, sensor: Sensor, start: &Scene, prior: &Scene) -> Option<(Scene, [f64; 5], f64)> {
+fn fit(curve: &Curve, sensor: Sensor, start: &IdealRig, prior: &IdealRig) -> Option<(IdealRig, [f64; 5], f64)> {
     let expected = prior.unknowns();
-    let mut u = Scene::UNCERTAINTY;
+    let mut u = IdealRig::UNCERTAINTY;
     u[2] /= prior.r * (1.0 - prior.r);
     let residuals = |x: &SVector<f64, 5>| {
-        let mut residuals = curve.residuals(&Scene::of(x).backbone(sensor))?.as_slice().to_vec();
+        let mut residuals = curve.residuals(&IdealRig::of(x).backbone(sensor))?.as_slice().to_vec();
         residuals.extend((0..5).map(|i| (x[i] - expected[i]) / u[i]));
         residuals.iter().all(|one| one.is_finite()).then_some(residuals)
     };
-    let best = LeastSquares::minimum(&Model(residuals), start.unknowns(), &(), FOUND)?;
-    let scene = Scene::of(&best.x);
+    let best = LeastSquares::minimum(&Model(residuals), start.unknowns(), &(), LEAST_GAIN)?;
+    let scene = IdealRig::of(&best.x);
     let (covariance, slopes) = (best.covariance(), scene.slopes());
     let uncertainty = std::array::from_fn(|i| covariance[(i, i)].sqrt() * slopes[i]);
     Some((scene, uncertainty, best.chi_square))
 }
 
-/// Every so many points of a backbone count for the effective constants.
-const THIN: usize = 4;
+/// Step from point to point of a backbone to which the effective constants are fitted: 50 of 200 points determine three.
+const BACKBONE_STRIDE: usize = 4;
 
 /// The particle whose closed form has the exact force of the scene: harmonics of the host change only its constants.
-fn effective(scene: &Scene, sensor: Sensor, power: i32) -> Option<Particle> {
+fn effective(scene: &IdealRig, sensor: Sensor, power: i32) -> Option<Particle> {
     let linear = scene.linear();
-    let backbone: Vec<[f64; 3]> = scene.backbone(sensor).into_iter().step_by(THIN).collect();
+    let backbone: Vec<[f64; 3]> = scene.backbone(sensor).into_iter().step_by(BACKBONE_STRIDE).collect();
     let particle = |x: &SVector<f64, 3>| {
         let [epsilon, b, r] = x.map(f64::exp).into();
         Particle { epsilon, b, r: r / (1.0 + r) }
@@ -142,7 +142,7 @@ fn effective(scene: &Scene, sensor: Sensor, power: i32) -> Option<Particle> {
         Some(backbone.iter().flat_map(error).collect())
     };
     let start = SVector::from([scene.epsilon, scene.b, scene.r / (1.0 - scene.r)].map(f64::ln));
-    LeastSquares::minimum(&Model(residuals), start, &(), FOUND).map(|best| particle(&best.x))
+    LeastSquares::minimum(&Model(residuals), start, &(), LEAST_GAIN).map(|best| particle(&best.x))
 }
 
 /// Power of the frequency by which the particle's force on a response grows.
@@ -154,7 +154,7 @@ fn power(sensor: Sensor) -> i32 {
 }
 
 impl Samples<'_> {
-    fn record(&self, scene: &Scene) -> Option<Record> {
+    fn record(&self, scene: &IdealRig) -> Option<Record> {
         Record::new(
             [self.response, self.base],
             self.sample_time,
@@ -165,7 +165,7 @@ impl Samples<'_> {
 }
 
 /// Regimes, curve and parameters, from samples and a rough scene. `None` without at least thirty periods of symmetric 1:1 motion.
-pub fn identify(samples: &Samples, rough: &Scene) -> Option<Identified> {
+pub fn identify(samples: &Samples, rough: &IdealRig) -> Option<Identified> {
     let mut scene = rough_scene(&samples.record(rough)?, rough);
     for pass in 1..=PASSES {
         let record = samples.record(&scene)?;
@@ -174,7 +174,7 @@ pub fn identify(samples: &Samples, rough: &Scene) -> Option<Identified> {
         let tolerance = TOLERANCES[usize::from(pass > 1)];
         let expected = Expected { particle, host: Complex64::ZERO, tolerance, scale };
         let (used, motions) = one_to_one(&record, &expected);
-        if used.iter().filter(|one| **one).count() < FEWEST {
+        if used.iter().filter(|one| **one).count() < FEWEST_PERIODS {
             return None;
         }
         let (estimate, solution) = Estimate::new(&record, &particle, scale, &used)?.fit()?;

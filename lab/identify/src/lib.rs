@@ -6,11 +6,11 @@
 #![forbid(unsafe_code)]
 
 mod fit;
+mod ideal_rig;
 mod particle;
 mod regime;
-mod scene;
 
 pub use fit::{Identified, Samples, identify};
+pub use ideal_rig::IdealRig;
 pub use particle::{Particle, Steady};
 pub use regime::{Expected, Likelihoods, MOTIONS, RESOLUTION, TOLERANCES, one_to_one, rough_scene};
-pub use scene::Scene;

@@ -40,12 +40,12 @@ pub struct Steady {
 
 /// Amplitude over that of the fold down to which the closed form is evaluated, and from which on the map starts: the lag diverges at the fold.
 const NEAR_FOLD: f64 = 1.002;
-const START: f64 = 1.02;
+const MAP_START: f64 = 1.02;
 /// Amplitude over that of the fold above which one lag describes the force. Between 3 and 7 % beyond the fold lies a bias of three standard
 /// uncertainties; the number is chosen, not derived.
 const BEYOND_FOLD: f64 = 1.0 / 0.93;
 /// Fewest impacts of a stretch.
-const FEWEST: usize = 8;
+const FEWEST_IMPACTS: usize = 8;
 
 /// An impact: its time, the motion of the mass there, its number, the particle's speed after it, and the sum of both speeds.
 #[derive(Debug, Clone, Copy)]
@@ -101,7 +101,7 @@ impl Particle {
     fn first(&self, path: &Path, t: f64) -> Option<Impact> {
         let [logarithm, rate] = path.at(t);
         let amplitude = logarithm.re.exp();
-        if amplitude < START * self.fold() {
+        if amplitude < MAP_START * self.fold() {
             return None;
         }
         let force = self.steady_motion(amplitude).force;
@@ -187,7 +187,7 @@ impl Element for Particle {
                     unit * one.sum * Complex64::cis(-phase) / (three[2].time - three[0].time),
                 )
             };
-            if impacts.len() >= FEWEST {
+            if impacts.len() >= FEWEST_IMPACTS {
                 stretches.push(impacts.windows(3).map(force).collect());
             }
         }

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 use vines_estimate::{Record, Window, probabilities, windows};
 
+use crate::ideal_rig::IdealRig;
 use crate::particle::Particle;
-use crate::scene::Scene;
 
 /// Noise of the mean force of a window over the scale of the force: how long the windows are.
 pub const RESOLUTION: f64 = 0.05;
@@ -73,14 +73,14 @@ fn evidence(likelihoods: &Likelihoods) -> f64 {
 /// Half the number of grid steps of a parameter, over two standard uncertainties of the scene.
 const GRID: i32 = 6;
 /// Rounds of regimes and parameters; in the first two all windows are 1:1, because a free particle on another frequency explains any hold.
-const ROUNDS: usize = 10;
+const MIXTURE_ROUNDS: usize = 10;
 const ALL_IMPACTS: usize = 2;
 
 /// A scene that fits the mixture of the motions: r and b on a grid, the rest by linear least squares, weighted by the motions' probabilities.
-pub fn rough_scene(record: &Record, scene: &Scene) -> Scene {
+pub fn rough_scene(record: &Record, scene: &IdealRig) -> IdealRig {
     let scale = scene.epsilon * scene.b;
     let windows = windows(record, RESOLUTION * scale);
-    let u = Scene::UNCERTAINTY;
+    let u = IdealRig::UNCERTAINTY;
     let steps = || (-GRID..=GRID).map(|n| 2.0 * f64::from(n) / f64::from(GRID));
     let mut best = (f64::INFINITY, *scene);
     for r in steps().map(|step| (scene.r + u[2] * step).clamp(0.1, 0.95)) {
@@ -91,7 +91,7 @@ pub fn rough_scene(record: &Record, scene: &Scene) -> Scene {
             if cost < best.0 {
                 let f0 = scene.f0 * (1.0 - 0.5 * frequency);
                 let zeta = (scene.zeta - 0.5 * damping).max(scene.zeta / 5.0);
-                best = (cost, Scene { f0, zeta, r, b, epsilon });
+                best = (cost, IdealRig { f0, zeta, r, b, epsilon });
             }
         }
     }
@@ -99,8 +99,8 @@ pub fn rough_scene(record: &Record, scene: &Scene) -> Scene {
 }
 
 /// Cost, epsilon, and the force per amplitude by errors of frequency and damping, of windows with given r and b.
-fn mixture(windows: &[Window], scene: &Scene, [r, b]: [f64; 2]) -> (f64, [f64; 3]) {
-    let u = Scene::UNCERTAINTY;
+fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2]) -> (f64, [f64; 3]) {
+    let u = IdealRig::UNCERTAINTY;
     let scale = scene.epsilon * scene.b;
     let prior = [u[4] * scene.epsilon, 2.0 * u[0], 2.0 * u[1] * scene.zeta].map(|one| 1.0 / (2.0 * one * one));
     let unit = Particle { epsilon: 1.0, b, r };
@@ -114,7 +114,7 @@ fn mixture(windows: &[Window], scene: &Scene, [r, b]: [f64; 2]) -> (f64, [f64; 3
         .collect();
     let mut found = Vector3::new(scene.epsilon, 0.0, 0.0);
     let mut cost = f64::INFINITY;
-    for round in 0..ROUNDS {
+    for round in 0..MIXTURE_ROUNDS {
         let mut normal = Matrix3::from_diagonal(&Vector3::from(prior));
         let mut right = Vector3::new(scene.epsilon * prior[0], 0.0, 0.0);
         for ((window, steady), weight) in windows.iter().zip(&steady).zip(&weights) {

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use serde::Deserialize;
 use vines_estimate::{Element, Estimate, Linear, Record};
-use vines_identify::{Particle, Samples, Scene, identify, rough_scene};
+use vines_identify::{IdealRig, Particle, Samples, identify, rough_scene};
 use vines_model::Sensor;
 
 type Pair = [f64; 2];
@@ -54,8 +54,8 @@ struct Impacts {
     lag: Vec<Pair>,
 }
 
-fn scene([f0, zeta, r, b, epsilon]: [f64; 5]) -> Scene {
-    Scene { f0, zeta, r, b, epsilon }
+fn scene([f0, zeta, r, b, epsilon]: [f64; 5]) -> IdealRig {
+    IdealRig { f0, zeta, r, b, epsilon }
 }
 
 impl Prototype {

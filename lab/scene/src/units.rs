@@ -5,7 +5,7 @@
 pub struct Unit {
     /// Its symbol: m, N or V.
     pub symbol: &'static str,
-    /// So many units are so many metres of the oscillator: of the two, one is 1, so that conversions round once.
+    /// A number of units, and the metres of the oscillator that they are. One of the two numbers is 1, so that conversions round once.
     ratio: [f64; 2],
 }
 
@@ -13,12 +13,12 @@ impl Unit {
     /// The metre of the oscillator.
     pub const METRE: Self = Self { symbol: "m", ratio: [1.0; 2] };
 
-    /// A unit of which one is so many metres of the oscillator.
+    /// The unit that is `metres` metres of the oscillator.
     pub fn of(symbol: &'static str, metres: f64) -> Self {
         Self { symbol, ratio: [1.0, metres] }
     }
 
-    /// A unit of which so many are a metre of the oscillator.
+    /// The unit of which `units` are a metre of the oscillator.
     pub fn per_metre(symbol: &'static str, units: f64) -> Self {
         Self { symbol, ratio: [units, 1.0] }
     }

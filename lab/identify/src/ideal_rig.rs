@@ -9,7 +9,7 @@ use vines_model::{Definition, Dimensionless, Sensor};
 
 /// The parameters of an ideal cavity.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scene {
+pub struct IdealRig {
     /// Natural frequency, Hz.
     pub f0: f64,
     /// Damping ratio.
@@ -27,7 +27,7 @@ const POINTS: usize = 200;
 /// Largest speed of the particle over `b omega`: the symmetric motion becomes unstable above 1.07.
 const FASTEST: f64 = 1.3;
 
-impl Scene {
+impl IdealRig {
     /// Standard uncertainties of a drawing: f0 and zeta (relative), r, b and epsilon (relative).
     pub const UNCERTAINTY: [f64; 5] = [0.01, 0.25, 0.15, 0.1, 0.15];
 
