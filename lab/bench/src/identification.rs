@@ -21,7 +21,7 @@ pub use asked::Departure;
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
 pub(crate) use decay::{PER_PERIOD, base_at_rest};
 pub use level::{Criterion, LevelEstimate, Unsteady};
-pub(crate) use level::{LAG, LONGEST_SETTLING, is_off_target};
+pub(crate) use level::{LONGEST_SETTLING, is_off_target};
 pub use resonance_fit::{Cycle, ResonanceFit};
 pub(crate) use response::{ASYMMETRIC, Line, classify, degrees, subharmonic, without_tones};
 pub use response::{Tone, drive_harmonics, foreign_tone, impacts, regime_by_response};

@@ -13,7 +13,6 @@ pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
 pub use oscillator::Simulated;
 pub(crate) use reference_control::OFF;
-pub(crate) use stages::derivative;
 pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
 pub use structure::{ShakerFault, SimulatedStructure};
 pub use vines_rig::{

@@ -5,12 +5,24 @@
 
 #![forbid(unsafe_code)]
 
-mod fit;
+mod branch;
+mod hypotheses;
+mod hypothesis;
 mod ideal_rig;
+mod motions;
 mod particle;
+mod points;
+mod quantity;
+mod record;
 mod regime;
 
-pub use fit::{Identified, Samples, identify};
+pub use hypotheses::{
+    ChannelTest, Data, EXCLUDED, FEWEST_POINTS, Fit, FitError, Hypotheses, MeasuredCurve, Rises, probability,
+};
+pub use hypothesis::Hypothesis;
 pub use ideal_rig::IdealRig;
 pub use particle::{Particle, Steady};
+pub use points::MeasuredPoint;
+pub use quantity::{Known, Quantity};
+pub use record::{Identified, Samples, Unidentified, identify};
 pub use regime::{Expected, Likelihoods, MOTIONS, RESOLUTION, TOLERANCES, one_to_one, rough_scene};

@@ -1,14 +1,12 @@
 //! `vines fit`: the parameters of a rig from measured points of its backbone.
 
-use std::cmp::Ordering;
-use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 use vines::fit::{
-    Candidate, Effect, EffectReport, Explanation, Fit, FitReport, FittedParameter, Found, Known, LeftOut,
-    LinearVerdict, MeasuredPoint, Measurements, Part, Quantity, Selection, decimals, find,
+    CALIBRATION, FitReport, FittedParameter, Found, Hypothesis, HypothesisReport, Known, LinearVerdict, Measurements,
+    Selection, Stretch, decimals, find,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
@@ -33,23 +31,26 @@ relative to the base, degrees, at which a point was measured; without it, it is 
 A recording has two channels over time, the response and the base. Delimiter, decimal mark, names and units are found;
 a file of `vines` needs no options. `python -m vines fit` has the same options, and reads other tables and formats. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, mm/s,
 m/s², g) or a multiple of it (-1g), the sensitivity of a sensor (100mV/g, 8V/mm, 125mm/s/V), or metres per unit. Velocities and accelerations
-become displacements harmonic by harmonic. Held stretches, slow sweeps and decays near phase resonance become points.
-The scene says what the sensor reads, and about which natural frequency and damping the structure has.
+become displacements. The recording gives drive and frequency of phase resonance over the amplitude, with their covariance, from held levels, sweeps
+and decays alike, at any phase. The scene says what the sensor reads, and about which rig was recorded: f0 within 1 %, b within 10 %, masses within
+15 %.
 
 The linear response of the structure is data as well, for the state of the particle (carried along or free) that agrees with the points. It
 comes from tracked.csv, tracked.json or identification.json of a rig that was checked, from `vines check --json`, or from a recording of a
 decay without impacts.
 
-The model is the exact symmetric 1:1 motion of a linear oscillator and a particle between two walls. The fit finds
+Every hypothesis is fitted to the same data, and printed as a row: an ideal cavity; friction, tilt, a restitution that falls with the speed
+(viscoelastic or plastic), by periodic motions of the plant; a cubic stiffness; a reference whose gain is wrong (--calibration); and a nonlinear
+spring without a particle. Its parameters are
   f0, zeta    natural frequency and damping ratio of the structure without the particle
   r           restitution coefficient
   b           half-width of the cavity
   epsilon     mass ratio m/M
 and, if --known gives one of M, m, k and c, the others in SI units. The scene is where the search begins, and what the result is compared with.
 
-If the model does not describe all points (probability of so large a chi-square below 1 %), friction, tilt, two laws of a restitution that
-depends on the speed, and a cubic stiffness are fitted one at a time, by periodic motions of the plant. If one of them describes the points, the
-result is its fit. If none does, at most a fifth of the points are left out; if that does not help, every line says so, and the exit code is 1.
+A hypothesis is excluded if a channel rejects it (p < 0.001), or if its chi-square exceeds the smallest by more than chance allows (0.1 %). The result is
+the range of each parameter over the hypotheses that are left: what is known (--known mu=0, --known b=0.01±0.0001) excludes hypotheses and narrows
+it. If none is left, or a spring without a particle is, the exit code is 1.
 
 Examples:
   vines fit out/tracked.csv
@@ -70,9 +71,13 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// A value from elsewhere, with its standard uncertainty; without one it is exact. May be repeated
+    /// A value from elsewhere, with its standard uncertainty; without one it is exact. Of the strength of a hypothesis, 0 excludes it. May be repeated
     #[arg(long, value_name = "SYMBOL=VALUE±U")]
     known: Vec<Known>,
+
+    /// Standard uncertainty of the gain of the reference, relative
+    #[arg(long, value_name = "SHARE", default_value_t = CALIBRATION, value_parser = positive)]
+    calibration: f64,
 
     /// Name and unit of a column; may be repeated
     #[arg(long, value_name = "QUANTITY=NAME:UNIT")]
@@ -116,95 +121,15 @@ pub(super) struct Arguments {
 struct Output<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
-    /// What the candidates say where the ideal cavity does not describe all points.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    verdict: Option<String>,
-    /// Effects with which other parameters describe the points as well.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    alternatives: Vec<EffectReport>,
-    /// What the points say of linear responses.
+    /// What the data say of linear responses.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     linear: &'a [LinearVerdict],
-    /// Parts of recordings.
+    /// The motions of recordings.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    parts: &'a [Part],
-    /// Periods of recordings that the plant follows.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    followed_periods: Option<usize>,
-    /// Parts of recordings that do not belong to the motion.
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    left_out_of_record: &'a [LeftOut],
-    /// Why the points of recordings are fitted instead of the recordings themselves.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    points_instead: Option<&'a str>,
-    /// Recordings that are far from the phase target half of the time in which the base moves.
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    off_target: &'a [String],
+    stretches: &'a [Stretch],
     /// How recordings were read, linear decays, and what counts as exact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
-}
-
-/// What the intervals depend on: other cavities that would give the same points. `is_assumed`: whether an ideal cavity is assumed, and no measured
-/// half-width confirms it.
-fn only_if_ideal(alternatives: &[EffectReport], is_assumed: bool) -> String {
-    let texts: Vec<String> = alternatives
-        .iter()
-        .map(|one| {
-            let EffectReport {
-                effect, symbol, unit, strength, uncertainty, possible_b_m, ..
-            } = one;
-            // Of those whose strength is given this is the largest.
-            let up_to = if *uncertainty == 0.0 { "up to" } else { "with" };
-            let (digits, mm) = (decimals(strength.abs()), 1e3 * possible_b_m);
-            let strength = with_unit(&format!("{strength:.digits$}"), unit);
-            format!("{effect} {up_to} {symbol} = {strength} (b = {mm:.2} mm) would give the same points")
-        })
-        .collect();
-    if texts.is_empty() {
-        let text = "the intervals hold if the cavity is ideal\n";
-        return if is_assumed { text.into() } else { String::new() };
-    }
-    format!(
-        "the intervals hold if the cavity is ideal: {}. Measure b with a ruler and the masses with a scale, and give --known b=VALUE±U and \
-         --known epsilon=VALUE±U\n",
-        texts.join("; ")
-    )
-}
-
-/// What the effects of a real cavity say.
-fn explained(explanation: &Explanation) -> String {
-    let chi_square = |fit: &Fit| format!("{:.0} for {}", fit.chi_square, fit.degrees);
-    let without = chi_square(&explanation.ideal);
-    let possible = explanation.possible().map(|candidate| {
-        let EffectReport { effect, symbol, unit, left_out, .. } = candidate.report();
-        let strength = with_unit(&with_decimals(candidate.strength), unit);
-        let without = match left_out {
-            0 => String::new(),
-            _ => {
-                format!("; {left_out} points of the smallest responses do not belong to this motion, and are left out")
-            }
-        };
-        let chi_square = chi_square(&candidate.fit);
-        format!("{effect} alone ({symbol} = {strength}, chi-square {chi_square}{without})")
-    });
-    let possible: Vec<String> = possible.collect();
-    match &possible[..] {
-        [] => {
-            let tried = explanation.candidates.iter();
-            let tried = tried.map(|one| format!("{} ({})", one.effect.names()[0], chi_square(&one.fit)));
-            let tried = match tried.collect::<Vec<String>>().join(", ") {
-                none if none.is_empty() => "none of them a motion exists".into(),
-                some => some,
-            };
-            format!("no single effect explains it: chi-square is {without} without one, with {tried}")
-        }
-        [one] => format!("{one} explains it; without it, chi-square is {without}"),
-        several => format!(
-            "{} explains it, the points do not say which; without it, chi-square is {without}",
-            several.join(" or ")
-        ),
-    }
 }
 
 /// What the points say of a linear response.
@@ -250,7 +175,7 @@ fn gathered(
     let modes = scene.structure.as_ref().map_or(1, |structure| structure.modes.len());
     let Arguments { known, response, drive, time, rate, late, .. } = arguments.clone();
     let selection = Selection { response, drive, time, rate, late };
-    let mut measured = Measurements { known, ..Measurements::default() };
+    let mut measured = Measurements { known, calibration: arguments.calibration, ..Measurements::default() };
     let (mut skipped, mut notes) = (0, Vec::new());
     for path in &arguments.points {
         let (phase, source) = (scene.definition().phase, read(path).map_err(Failure::input)?);
@@ -314,49 +239,38 @@ pub(super) fn run(
         let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines(&notes))?;
         return Ok(Results::new(text, Written::default));
     }
-    let bar = progress_bar(Effect::ALL.len() as u64, "fitting", "effects of a real cavity");
+    let bar = progress_bar(Hypothesis::ALL.len() as u64, "fitting", "hypotheses");
     let found = find(&measured, &scene, |done| bar.set_position(done as u64));
     bar.finish_and_clear();
     let found = found.map_err(Failure::run)?;
-    let (report, record) = (found.fit.report(&scene.plant), found.record.as_ref());
-    let verdict = found.explanation.as_ref().map(explained);
-    let alternatives: Vec<EffectReport> = found.alternatives.iter().map(Candidate::report).collect();
-    let is_width = |known: &Known| matches!(known, Known::Value { quantity: Quantity::B, .. });
-    let is_ideal = found.explanation.is_none() && !found.fit.is_rejected();
-    let is_assumed = is_ideal && !arguments.known.iter().any(is_width);
+    let report = found.report(&scene.plant);
     let printed = Output {
         report: &report,
-        verdict: verdict.clone(),
-        alternatives: alternatives.clone(),
         linear: &found.linear,
-        parts: &found.parts,
-        followed_periods: record.map(|record| record.periods),
-        left_out_of_record: record.map_or(&[], |record| &record.left_out),
-        points_instead: found.points_instead.as_deref(),
-        off_target: &found.off_target,
+        stretches: &found.stretches,
         notes: notes.clone(),
     };
+    let skipped = (skipped > 0).then(|| format!("{skipped} points are not settled or not symmetric 1:1, and left out"));
     let text = output(arguments.json, &printed, || {
         [
             lines(&notes),
-            recorded(&found.parts),
-            summary(&report, &found, skipped),
-            lines(found.points_instead.as_ref()),
-            lines(&found.off_target),
+            recorded(&found.stretches),
+            lines(skipped),
+            hypotheses(&report).text(),
+            "\n".into(),
+            parameters(&report).text(),
+            format!("{}\n", verdict(&report)),
             lines(found.linear.iter().map(of_linear)),
-            lines(&verdict),
-            only_if_ideal(&alternatives, is_assumed),
         ]
         .concat()
     })?;
     let Arguments { figure, out, json, .. } = arguments.clone();
-    let Found { fit, plant, points, .. } = found;
-    let plant = plant_section(&report, &plant, verdict.as_deref());
+    let plant = plant_section(&report, &found.plant(&scene.plant));
     let scene_text = provenance(&arguments.points, &report) + &arguments.scene.with_plant(&plant)?;
     Ok(Results::new(text, move || {
         let mut files = Written::default();
         if let Some(path) = &figure {
-            let figure = fitted(&points, &fit, &scene, verdict.as_deref()).svg();
+            let figure = fitted(&found, &scene).svg();
             files.add(vines::write_file(path, &figure).map(Some));
         }
         if let Some(path) = &out {
@@ -366,64 +280,57 @@ pub(super) fn run(
             files.paths.clear();
         }
         if !report.describes {
-            files.failures.push(Failure::run(format!(
-                "the model does not describe the points: chi-square is {:.0} for {} degrees of freedom. Uncertainties that are too small, \
-                 points of several branches, or several effects at a time may be the reason",
-                fit.chi_square, fit.degrees
-            )));
+            files.failures.push(Failure::run(contradiction(&found, &report)));
         }
         files
     }))
 }
 
-/// The parts of recordings.
-fn recorded(parts: &[Part]) -> String {
-    if parts.is_empty() {
+/// The motions of recordings.
+fn recorded(stretches: &[Stretch]) -> String {
+    if stretches.is_empty() {
         return String::new();
     }
-    let rows = parts.iter().map(|part| {
-        let [from, to] = part.seconds.map(|time| format!("{time:.2}"));
-        let kind = format!("{:?}", part.kind).to_lowercase();
-        let values = part.point.map(|MeasuredPoint { response, omega, drive, .. }| {
-            [omega.scaled(1.0 / TAU), response.scaled(1e3), drive.scaled(1e3)].map(with_decimals)
-        });
-        let [f, a, e] = values.unwrap_or_default();
-        [from, to, kind, part.regime.to_string(), f, a, e]
+    let rows = stretches.iter().map(|one| {
+        let [from, to] = one.seconds.map(|time| format!("{time:.2}"));
+        let [low, high] = one.response_m.map(|amplitude| format!("{:.3}", 1e3 * amplitude));
+        [from, to, one.motion.to_string(), low, high]
     });
-    Table::new("from, s | to, s | part | motion | f, Hz | A, mm | E, mm")
-        .rows(rows)
-        .text()
-        + "\n"
+    Table::new("from, s | to, s | motion | smallest response, mm | largest, mm").rows(rows).text() + "\n"
 }
 
-/// The parameters beside those of the scene, whether the model describes the data, and what in them is not as it should be.
-fn summary(report: &FitReport, found: &Found, skipped: usize) -> String {
-    let record = found.record.as_ref();
-    let of_record = record.iter().flat_map(|record| &record.left_out);
-    let of_record = of_record.map(|LeftOut { origin, seconds: [from, to] }| {
-        format!("{origin}: {from:.2} s to {to:.2} s does not belong to the motion, and is left out")
+/// Every hypothesis in a row.
+fn hypotheses(report: &FitReport) -> Table {
+    let rows = report.hypotheses.iter().map(|one| {
+        let HypothesisReport { hypothesis, symbol, unit, chi_square, degrees, .. } = one;
+        let strength = one.strength.zip(one.u_strength).map(|(value, uncertainty)| {
+            format!("{symbol} = {}", with_unit(&with_decimals(Estimate { value, uncertainty }), unit))
+        });
+        let value = |n: usize| one.parameters.get(n).map_or_else(String::new, |parameter| {
+            with_decimals(Estimate { value: parameter.value, uncertainty: parameter.uncertainty })
+        });
+        let p = one.p_value.map_or_else(String::new, |p| if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") });
+        cells![
+            *hypothesis,
+            strength.unwrap_or_default(),
+            value(0),
+            value(1),
+            value(2),
+            value(3),
+            value(4),
+            format!("{chi_square:.1}"),
+            *degrees,
+            p,
+            if one.excluded.is_some() { "excluded" } else { "possible" }
+        ]
     });
-    let skipped = (skipped > 0).then(|| format!("{skipped} points are not settled or not symmetric 1:1, and left out"));
-    let numbers: Vec<String> = report.left_out.iter().map(usize::to_string).collect();
-    let contradicting = (!numbers.is_empty()).then(|| {
-        format!(
-            "{} of {} points contradict the others, and are left out: {}",
-            numbers.len(),
-            found.points.len(),
-            numbers.join(", ")
-        )
-    });
-    let notes = of_record
-        .chain(wrong_uncertainties(report))
-        .chain(skipped)
-        .chain(contradicting);
-    let verdict = chi_square(report, record.map(|record| record.periods));
-    format!("{}\n{verdict}\n{}", parameters(report).text(), lines(notes))
+    Table::new("hypothesis | strength | f0, Hz | zeta | r | b, m | epsilon | chi-square | for | p | ").rows(rows)
 }
 
 /// The parameters of a fit beside those of the scene.
 fn parameters(report: &FitReport) -> Table {
-    let doubt = if report.describes { "" } else { " (rejected)" };
+    let is_possible = report.hypotheses.iter().any(|one| one.excluded.is_none());
+    let doubt = if is_possible { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|parameter| {
         let FittedParameter { symbol, unit, value, uncertainty, expected } = *parameter;
         let [value, expected, difference] = match exact(parameter) {
@@ -439,43 +346,30 @@ fn parameters(report: &FitReport) -> Table {
     Table::new("parameter | value | unit | scene | difference").rows(rows)
 }
 
-/// What chi-square says; `periods`: of recordings, if they are fitted.
-fn chi_square(report: &FitReport, periods: Option<usize>) -> String {
-    let p = report
-        .p_value
-        .map_or_else(|| "without a degree of freedom".into(), |p| format!("p = {p:.2}"));
-    let verdict = match (report.describes, &report.undetermined[..]) {
-        (true, []) => "the model describes them".into(),
-        (true, undetermined) => format!(
-            "this says little, because they do not determine {}. Measure at least three levels far apart, with `vines backbone` (--record \
-             for a recording), or give --known",
-            undetermined.join(", ")
+/// What the hypotheses say together.
+fn verdict(report: &FitReport) -> String {
+    let possible = report.hypotheses.iter().filter(|one| one.excluded.is_none());
+    let possible: Vec<&str> = possible.map(|one| one.hypothesis).collect();
+    let undetermined = match &report.undetermined[..] {
+        [] => String::new(),
+        some => format!(
+            "; the data do not determine {}: measure at least three levels far apart, with `vines backbone` (--record for a recording), a decay, or \
+             what --known takes: b with a ruler, masses with a scale",
+            some.join(", ")
         ),
-        (false, _) => "the model does not describe them".into(),
     };
-    let what = match periods {
-        Some(periods) => format!("{periods} periods of recordings"),
-        None => format!("{} points", report.residuals.len()),
-    };
-    let FitReport { chi_square, degrees, .. } = report;
-    format!("{what}; chi-square {chi_square:.1} for {degrees} degrees of freedom ({p}): {verdict}")
+    match &possible[..] {
+        [] => "none of these describes the data".into(),
+        some => format!("± is the range over what is possible: {}{undetermined}", some.join(", ")),
+    }
 }
 
-/// The channels whose uncertainties do not agree with their residuals.
-fn wrong_uncertainties(report: &FitReport) -> impl Iterator<Item = String> {
-    let channels = ["responses", "frequencies", "drives"].into_iter().zip(&report.channels);
-    channels.filter_map(|(channel, test)| {
-        let size = match test.verdict() {
-            Some(Ordering::Less) => "small",
-            Some(Ordering::Greater) => "large",
-            _ => return None,
-        };
-        let [found, expected] = [test.chi_square, test.expected];
-        let decimals = decimals(found.min(expected));
-        Some(format!(
-            "the uncertainties of the {channel} are too {size}: their chi-square is {found:.decimals$}, and {expected:.decimals$} is expected"
-        ))
-    })
+/// Why the exit code is 1.
+fn contradiction(found: &Found, report: &FitReport) -> String {
+    match found.hypotheses.possible().next() {
+        Some(_) => "a nonlinear spring without a particle describes the data: nothing in them shows impacts".into(),
+        None => format!("none of these hypotheses describes the data; nearest is {}: {}", report.best, found.worst()),
+    }
 }
 
 /// Where the plant of a scene comes from.
@@ -483,11 +377,11 @@ fn provenance(files: &[PathBuf], report: &FitReport) -> String {
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let p = report.p_value.map_or_else(String::new, |p| format!(", p = {p:.2}"));
     format!(
-        "# Fitted by vines {} on {} to {} points of {}:\n# chi-square {:.1} for {} degrees of freedom{p}.\n\n",
+        "# Fitted by vines {} on {} to {}: {},\n# chi-square {:.1} for {} degrees of freedom{p}.\n\n",
         env!("CARGO_PKG_VERSION"),
         chrono::Utc::now().format("%Y-%m-%d"),
-        report.residuals.len(),
         files.join(", "),
+        report.best,
         report.chi_square,
         report.degrees
     )
@@ -500,7 +394,7 @@ fn exact(parameter: &FittedParameter) -> Option<f32> {
 }
 
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
-fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: Option<&str>) -> String {
+fn plant_section(report: &FitReport, plant: &vines::scene::Parameters) -> String {
     let lines = vines::scene::plant_keys(plant).into_iter().map(|(symbol, value)| {
         let fitted = report.parameters.iter().find(|one| one.symbol == symbol);
         match fitted.map(|one| (exact(one), one.uncertainty)) {
@@ -509,17 +403,16 @@ fn plant_section(report: &FitReport, plant: &vines::scene::Parameters, verdict: 
             Some((None, u)) => format!("{symbol} = {value}  # ± {u:.0$}\n", decimals(u)),
         }
     });
-    let verdict = verdict.map(|verdict| format!("# {verdict}\n")).unwrap_or_default();
     let scale = match report.parameters.iter().any(|one| one.symbol == "M") {
         true => "",
         false => "# Masses, stiffness and damping are scaled by the mass of the scene.\n",
     };
     let doubt = match report.describes {
         true => "",
-        false => "# Rejected: the model does not describe the points.\n",
+        false => "# Rejected: no hypothesis with a particle alone describes the data.\n",
     };
     format!(
-        "[plant]\n{verdict}{doubt}{scale}# The values are correlated: their digits keep what they determine together, such as k/M.\n{}",
+        "[plant]\n# ± is the range over all hypotheses that are possible.\n{doubt}{scale}# The values are correlated: their digits keep what they determine together, such as k/M.\n{}",
         lines.collect::<String>()
     )
 }

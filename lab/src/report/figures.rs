@@ -11,7 +11,7 @@ use nalgebra::DVector;
 use super::figure::{Figure, Marked, Panel, Place, Shape};
 use super::theme::{EXACT, INK, MEASURED, PARTICLE, PREDICTED, THEORY};
 use crate::comparison::{Comparison, ExactCurve, TrackedComparison};
-use crate::fit::{Fit, MeasuredPoint};
+use crate::fit::{Found, MeasuredPoint};
 use crate::numerics::{Estimate, HarmonicBasis, equally_spaced, range};
 use crate::orbit::{StructureBranch, StructureOrbit};
 use crate::record::Record;
@@ -212,13 +212,13 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
     }
 }
 
-/// Measured points beside the backbones of a scene and of the fitted rig, and below them the residuals, over amplitude.
-///
-/// The places of the fit are those nearest to the points, with the effects of the cavity that it names.
-pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Option<&str>) -> Figure {
+/// What was measured beside the backbones of a scene and of the best hypothesis, and below them the residuals, over amplitude.
+pub fn fitted(found: &Found, scene: &Scene) -> Figure {
+    let fit = found.hypotheses.best();
+    let points = found.data.shown();
+    let residuals = found.data.apart(fit);
     let p = scene.dimensionless();
-    let used = (0..points.len()).filter(|n| !fit.left_out.contains(n));
-    let used: Vec<(&MeasuredPoint, _)> = used.map(|n| &points[n]).zip(&fit.residuals).collect();
+    let used: Vec<(&MeasuredPoint, &[f64; 3])> = points.iter().zip(&residuals).collect();
     let place = |point: &MeasuredPoint| (1e3 * point.response.value, point.omega.value / TAU);
     let at = |measured: Estimate, over_u: f64| measured.value + over_u * measured.uncertainty;
     let model = used.iter().map(|(point, residual)| {
@@ -246,11 +246,9 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
     circles(&mut backbone, points.iter().map(place), "measured");
     let bars = points.iter().map(|point| (place(point), point.omega.uncertainty / TAU));
     error_bars(&mut backbone, bars, true, y.1 - y.0);
-    let left_out = fit.left_out.iter().map(|n| place(&points[*n]));
-    backbone.add(Shape::Cross, left_out, MEASURED, "left out");
 
-    let residuals = fit.residuals.iter().flatten().map(|residual| residual.abs());
-    let most = 1.1 * residuals.fold(3.0, f64::max);
+    let sizes = residuals.iter().flatten().map(|residual| residual.abs());
+    let most = 1.1 * sizes.fold(3.0, f64::max);
     let mut below = Panel::new((x, amplitude), ((-most, most), "fit less measured, over u"));
     for limit in [-1.96, 1.96] {
         below.add(Shape::Dashed(1.0), [(x.0, limit), (x.1, limit)], INK, "±1.96 u");
@@ -265,19 +263,15 @@ pub fn fitted(points: &[MeasuredPoint], fit: &Fit, scene: &Scene, verdict: Optio
         let places = used.iter().map(|(point, residual)| (place(point).0, residual[n]));
         below.add(shape, places, colour, name);
     }
-    let model = if fit.is_rejected() { "rejected" } else { "not rejected" };
-    let text = format!(
-        "chi-square {:.1} for {} degrees of freedom: {model}",
-        fit.chi_square, fit.degrees
-    );
-    let verdict = verdict.map(|verdict| verdict.replace("; ", ";\n"));
+    let is_possible = if fit.excluded.is_some() { "excluded" } else { "possible" };
     Figure {
         title: "Measured points, scene and fit".into(),
-        caption: [verdict, Some(text)]
-            .into_iter()
-            .flatten()
-            .collect::<Vec<_>>()
-            .join("\n"),
+        caption: format!(
+            "{}: chi-square {:.1} for {} degrees of freedom, {is_possible}",
+            fit.hypothesis.names()[0],
+            fit.chi_square,
+            fit.degrees
+        ),
         height: LOW,
         rows: vec![vec![backbone], vec![below]],
     }

@@ -1,36 +1,22 @@
-//! Points of phase resonance from a recording: two channels, the response and the base, of any run near resonance.
+//! Recordings: two channels, the response and the base, of any run near resonance, and what they say of drive and frequency of phase resonance.
 //!
-//! 1. The base is the clock. Where it moves, its amplitude and phase over [`CLOCK_WINDOW`] periods, interpolated, stand for the command that a bench
-//!    would know; where it rests, the rig decays.
-//! 2. The periods of a driven part are cut into windows of about the same amplitude, near phase resonance: long where the response is held,
-//!    short where it is swept.
-//! 3. Each window gives a point by the fit that the bench itself uses ([`Criterion::best`]); the slopes are those of the points whose amplitudes are
-//!    next to it.
-//! 4. A decay gives drive and frequency from the rate and the frequency of the response, with E = 0 in the balance of the amplitude.
-//!
-//! The impacts follow a change of the amplitude late. The errors by this are alike within a sweep or a decay of n points, so that averaging does
-//! not reduce them: each counts with the factor √n.
+//! The curve is that of [`vines_identify::identify`]: held levels, sweeps and decays are one case, and the phase does not matter. Before that, the
+//! channels are made displacements, and what is no measurement of a rig near resonance is refused.
 
-use std::collections::BTreeSet;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::numerics::{Estimate, RANDOM, mean, range, slope};
-use vines_model::regime::Regime;
-use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
+use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Quantity, Samples, Unidentified, identify};
+use vines_model::numerics::{Estimate, mean, range};
 use vines_model::{Measurand, Sensor};
-
-use super::{MeasuredPoint, decimals};
-use crate::identification::{
-    Criterion, Cycle, Harmonic, LAG, LevelEstimate, Line, PHASE_RANGE, ResonanceFit, harmonic, regime_by_response,
-};
-use crate::record::Sample;
-use crate::rig::{Command, Drive, Sensors};
 use vines_scene::knowledge::{Knowledge, Target};
-use vines_scene::linear::LinearResponse;
+use vines_scene::linear::{LinearResponse, MeasuredLinear, ParticleState};
 use vines_scene::scene::Scene;
+
+use super::decimals;
+use crate::identification::{Harmonic, Line, PHASE_RANGE, harmonic};
 
 /// Two channels of a measurement, sampled at equal distances.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,33 +60,19 @@ impl Display for LinearDecay {
     }
 }
 
-/// What a part of a recording is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// The response is held.
-    Held,
-    /// The response changes slowly while the base moves.
-    Sweep,
-    /// The base rests.
-    Decay,
-}
-
-/// A part of a recording that gives a point, or the reason why it gives none.
-#[derive(Debug, Clone, Serialize)]
-pub struct Part {
-    /// Its begin and end, s since the first sample.
-    pub seconds: [f64; 2],
-    /// What it is.
-    pub kind: Kind,
-    /// The point; absent if it is not one of the backbone, or if another part has a better one at this amplitude.
-    #[serde(skip)]
-    pub point: Option<MeasuredPoint>,
-    /// What the point is if the motion is 1:1, where only the record as a whole can show whether it is.
-    #[serde(skip)]
-    pub(super) candidate: Option<MeasuredPoint>,
-    /// The regime of its motion.
-    pub regime: Regime,
+impl From<LinearDecay> for MeasuredLinear {
+    /// A decay does not tell the state of the particle.
+    fn from(decay: LinearDecay) -> Self {
+        let f0 = decay.omega.scaled(1.0 / TAU);
+        Self {
+            f0: f0.value,
+            u_f0: f0.uncertainty,
+            zeta: decay.zeta.value,
+            u_zeta: decay.zeta.uncertainty,
+            correlation: 0.0,
+            particle: ParticleState::Unknown,
+        }
+    }
 }
 
 /// Why a recording gives no points: the message says what is wrong, and what to do.
@@ -124,16 +96,10 @@ const SLOW: usize = 16;
 const FEWEST_PERIODS: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
-/// Fewest periods of a window: the fit needs four, and so do its halves, which are compared.
-const LEAST: usize = 2 * ResonanceFit::FEWEST;
-/// Largest relative distance of the amplitude from the mean of the first [`LEAST`] periods of a window, in these: drive and frequency are nearly
-/// linear in the amplitude there.
-const RANGE: f64 = 0.04;
-/// Largest such distance within a window of more periods, whose response is held. A change by twice this is a sweep; so far apart, two points give a
-/// slope.
-const HELD: f64 = 0.005;
-/// Largest relative standard uncertainty of the drive of a point.
-const LARGEST_DRIVE_UNCERTAINTY: f64 = 0.2;
+/// Fewest periods of a decay.
+const LEAST: usize = 8;
+/// Smallest damping ratio of a structure.
+const LEAST_DAMPING: f64 = 1e-5;
 /// Base over its largest amplitude below which it rests, unless the noise is larger.
 const RESTS: f64 = 0.02;
 /// Smallest amplitude of an oscillation over its standard uncertainty.
@@ -146,62 +112,11 @@ const NEAR_RESONANCE: f64 = 0.2;
 /// Largest ratio of the damping in the two halves of a linear decay, and in a piece and the whole, and of its inverse: impacts in 1:1 motion double
 /// the loss near the fold.
 const DAMPING_RATIO: f64 = 1.5;
-/// Relative standard uncertainty of the damping that a scene states: three of them are 30 %.
-const DAMPING: f64 = 0.1;
-
-/// The parts of each recording of a rig that is about as `scene` says.
-///
-/// # Errors
-/// As [`Recording::parts`].
-pub fn parts(recordings: &[Recording], scene: &Scene) -> Result<Vec<Vec<Part>>, RecordingError> {
-    let linear = LinearResponse::of(&scene.plant);
-    let uncertainty = DAMPING * linear.damping_rate;
-    let knowledge = scene.knowledge().measured(LinearResponse { uncertainty, ..linear });
-    recordings.iter().map(|record| record.parts(&knowledge)).collect()
-}
-
 impl Recording {
-    /// The parts of the recording, with their points. `knowledge`: of the rig, with the natural frequency and the damping of the structure without
-    /// impacts.
-    ///
-    /// # Errors
-    /// Channels that cannot be those of a rig near resonance; the message says which, and what to do.
-    pub fn parts(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
-        self.prepared(knowledge)?
-            .parts_near_resonance(&self.knowledge(knowledge))
-    }
-
     /// What is known, with the sample time and the channels of this recording.
     fn knowledge(&self, knowledge: &Knowledge) -> Knowledge {
         let target = Target { measurands: self.measurands, ..knowledge.target };
         Knowledge { sample_time: self.sample_time, target, ..*knowledge }
-    }
-
-    fn parts_near_resonance(&self, knowledge: &Knowledge) -> Result<Vec<Part>, RecordingError> {
-        let linear = &knowledge.linear;
-        let anchors = self.anchors(knowledge);
-        let moves = |anchor: &Anchor| anchor.response.map(|_| anchor.drive.is_some());
-        let stretches = anchors.chunk_by(|anchor, next| moves(anchor) == moves(next));
-        let of = |base_moves: bool| move |stretch: &&[Anchor]| moves(&stretch[0]) == Some(base_moves);
-        let target = knowledge.target;
-        let periods = |stretch: &[Anchor]| {
-            let samples = self.samples(stretch);
-            let cycles = Cycle::all(&samples, self.sample_time, target);
-            (samples, cycles)
-        };
-        let driven: Vec<_> = stretches.clone().filter(of(true)).map(periods).collect();
-        self.plausible(&driven.iter().flat_map(|(_, cycles)| cycles).collect::<Vec<_>>())?;
-        let windows = driven.iter().flat_map(|(samples, cycles)| windows(samples, cycles));
-        let mut parts = evaluated(&windows.collect::<Vec<_>>(), knowledge);
-        let decays = stretches.filter(of(false));
-        parts.extend(decays.flat_map(|stretch| decay(stretch, linear, self.sample_time)));
-        parts.sort_by(|first, second| first.seconds[0].total_cmp(&second.seconds[0]));
-        best_of_each_amplitude(&mut parts);
-        let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
-        if !is_seen && parts.iter().all(|part| part.candidate.is_none()) {
-            return Err(self.nothing(&parts, knowledge));
-        }
-        Ok(parts)
     }
 
     /// The channels as the bench has them: in m, and without their slow drift.
@@ -381,46 +296,59 @@ impl Recording {
         anchors
     }
 
-    /// The samples of a part in which the base moves, with the command that its fits stand for.
-    fn samples(&self, run: &[Anchor]) -> Vec<Sample> {
-        let knots: Vec<(f64, Harmonic)> = run.iter().filter_map(|at| Some((at.middle, at.drive?))).collect();
-        let mut samples = Vec::new();
-        for pair in knots.windows(2) {
-            let [(from, left), (to, right)] = [pair[0], pair[1]];
-            let duration = (to - from) * self.sample_time;
-            // The number of turns between the two phases is that of the mean frequency.
-            let expected = 0.5 * (left.omega + right.omega) * duration;
-            let rest = right.phase - left.phase - expected;
-            let omega = (expected + rest - TAU * (rest / TAU).round()) / duration;
-            for n in from.round() as usize..to.round() as usize {
-                let share = (n as f64 - from) / (to - from);
-                let amplitude = left.amplitude + share * (right.amplitude - left.amplitude);
-                let drive = Drive { omega, amplitude, displacement: 0.0 };
-                samples.push(Sample {
-                    time: n as f64 * self.sample_time,
-                    sensors: Sensors { response: self.response[n], reference: Some(self.drive[n]) },
-                    command: Command { drive, ..Command::default() },
-                    ..Sample::default()
-                });
-            }
-        }
-        samples
+    /// The curve of phase resonance of a rig that is about as `scene` says, and the motions that the recording shows.
+    ///
+    /// # Errors
+    /// Channels that cannot be those of a rig near resonance, and a recording without symmetric 1:1 motion; the message says what to do.
+    pub fn curve(&self, scene: &Scene) -> Result<(MeasuredCurve, Vec<Stretch>), RecordingError> {
+        let knowledge = self.knowledge(&scene.knowledge());
+        let one = self.prepared(&knowledge)?;
+        one.plausible(&one.anchors(&knowledge), &knowledge)?;
+        let Self { origin, sample_time, measurands, .. } = &one;
+        let natural = knowledge.linear.omega0 * sample_time;
+        let [response, base] = [0, 1].map(|channel| {
+            let values = if channel == 0 { &one.response } else { &one.drive };
+            // A filter before the sampling passes less of the natural frequency.
+            let passed = knowledge.target.displacement(channel, knowledge.linear.omega0).norm();
+            let found = displacements(values, measurands[channel], natural);
+            found.into_iter().map(|value| passed * value).collect::<Vec<f64>>()
+        });
+        let sensor = scene.definition().sensor;
+        let samples = Samples { response: &response, base: &base, sample_time: *sample_time, sensor };
+        let found = identify(&samples, &rough(scene)).map_err(|why| self.without_curve(&why))?;
+        let stretches = Stretch::all(&found);
+        let periods = found.time.iter().zip(&found.amplitude).zip(&found.used);
+        let periods = periods.filter(|(_, used)| **used).map(|((time, amplitude), _)| [*time, *amplitude]).collect();
+        Ok((MeasuredCurve { origin: origin.clone(), curve: found.curve, periods }, stretches))
     }
 
-    /// Refuses channels that are swapped, or of which one has the wrong sign. `cycles`: the periods in which the base moves.
-    fn plausible(&self, cycles: &[&Cycle]) -> Result<(), RecordingError> {
+    /// Refuses channels of which the response has no oscillation near the natural frequency, and channels that are swapped, or of which one has the
+    /// wrong sign.
+    fn plausible(&self, anchors: &[Anchor], knowledge: &Knowledge) -> Result<(), RecordingError> {
         let Self { origin, channels: [response, drive], .. } = self;
-        let ratio =
-            mean(cycles.iter().map(|cycle| cycle.base.norm())) / mean(cycles.iter().map(|cycle| cycle.amplitude()));
+        let (hertz, strongest, rate) = (knowledge.linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
+        let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
+        if !is_seen && (strongest / hertz - 1.0).abs() > NEAR_RESONANCE {
+            return Err(RecordingError(format!(
+                "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
+                 If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
+            )));
+        }
+        let both: Vec<[Harmonic; 2]> = anchors.iter().filter_map(|one| Some([one.response?, one.drive?])).collect();
+        let [of_response, of_base] = [0, 1].map(|n| mean(both.iter().map(|one| one[n].amplitude)));
+        let ratio = of_base / of_response;
         if ratio > 1.0 {
             return Err(RecordingError(format!(
                 "{origin}: channel {drive} (base) is {ratio:.1} times as large as channel {response} (response), and at resonance the response is the \
                  larger one: are the channels swapped, or their units different?"
             )));
         }
-        let is_near = |cycle: &Cycle, phase: f64| (cycle.phase_error.abs() - phase).abs() < PHASE_RANGE;
-        let near = |phase: f64| cycles.iter().filter(|cycle| is_near(cycle, phase)).count();
-        if near(PI) > near(0.0) {
+        let is_near = |[response, base]: &[Harmonic; 2], phase: f64| {
+            let apart = response.phase - base.phase - phase;
+            (apart - TAU * (apart / TAU).round()).abs() < PHASE_RANGE
+        };
+        let near = |phase: f64| both.iter().filter(|one| is_near(one, phase)).count();
+        if near(FRAC_PI_2) > near(-FRAC_PI_2) {
             return Err(RecordingError(format!(
                 "{origin}: the response (channel `{response}`) leads the base (channel `{drive}`) by about a quarter of a period, where it lags on \
                  every passive rig: one of the channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
@@ -429,63 +357,17 @@ impl Recording {
         Ok(())
     }
 
-    /// Why less than half of the recording has an oscillation near the natural frequency.
-    fn nothing(&self, parts: &[Part], knowledge: &Knowledge) -> RecordingError {
-        let linear = &knowledge.linear;
-        let Self { origin, channels: [response, _], .. } = self;
-        let (hertz, strongest, rate) = (linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
-        if (strongest / hertz - 1.0).abs() > NEAR_RESONANCE {
-            return RecordingError(format!(
-                "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
-                 If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
-            ));
-        }
-        self.without_points(parts, knowledge)
-    }
-
-    /// That the base moves, but half of the time far from the phase target, where a part gives no point. The recording is prepared.
-    pub(super) fn off_target(&self, knowledge: &Knowledge) -> Option<String> {
-        let (knowledge, target) = (self.knowledge(knowledge), knowledge.target.phase);
-        let error = |anchor: &Anchor| {
-            let error = anchor.response?.phase - anchor.drive?.phase - target;
-            Some(error - TAU * (error / TAU).round())
+    /// Why there is no curve.
+    fn without_curve(&self, why: &Unidentified) -> RecordingError {
+        let Self { origin, .. } = self;
+        let found: Vec<&str> = why.motions.iter().map(|motion| MOTIONS[*motion]).collect();
+        let found = match &found[..] {
+            [] => "nothing".into(),
+            some => some.join(", "),
         };
-        let mut errors: Vec<f64> = self.anchors(&knowledge).iter().filter_map(error).collect();
-        errors.sort_by(f64::total_cmp);
-        let (periods, error) = (errors.len(), *errors.get(errors.len() / 2)?);
-        let phase = target + error;
-        let phase = (phase - TAU * (phase / TAU).round()).to_degrees();
-        let Self { origin, channels: [response, drive], .. } = self;
-        (error.abs() > PHASE_RANGE).then(|| {
-            format!(
-                "{origin}: in the {periods} periods in which the base {drive} moves, the phase of the response {response} relative to it is {phase:.1} degrees \
-                 (median), and the scene asks for {} degrees. If the rig was held at this phase, give it: --set controller.phase_target={phase:.1}",
-                knowledge.numbers.definition.phase_in_degrees()
-            )
-        })
-    }
-
-    /// That nothing in the recording shows 1:1. The recording is prepared.
-    pub(super) fn without_points(&self, parts: &[Part], knowledge: &Knowledge) -> RecordingError {
-        let Self { origin, channels: [response, drive], .. } = self;
-        let regimes: BTreeSet<String> = parts.iter().map(|part| part.regime.to_string()).collect();
-        let found = match regimes.into_iter().collect::<Vec<_>>().join(", ") {
-            none if none.is_empty() => "no such stretch".into(),
-            some => format!("found: {some}"),
-        };
-        if let Some(message) = self.off_target(knowledge) {
-            return RecordingError(message);
-        }
-        if parts.iter().all(|part| part.kind == Kind::Decay) && self.drive_is_named() {
-            return RecordingError(format!(
-                "{origin}: the base {drive} rests, and the response {response} decays neither without impacts nor with those of a 1:1 motion: is channel \
-                 {drive} connected?"
-            ));
-        }
         RecordingError(format!(
-            "{origin}: no stretch of {LEAST} periods near the phase target is symmetric 1:1 ({found}). A point needs a held response or a slow sweep, \
-             where the phase of the response {response} relative to the base {drive} is {} degrees, or a decay",
-            knowledge.numbers.definition.phase_in_degrees()
+            "{origin}: fewer than thirty periods show symmetric 1:1 impacts of the particle that the scene describes (found: {found}). Record held \
+             levels, a slow sweep or a decay above the fold, and give the scene that was recorded: f0 within 1 %, b within 10 %, masses within 15 %"
         ))
     }
 
@@ -567,210 +449,60 @@ struct Anchor {
     drive: Option<Harmonic>,
 }
 
-/// Periods of about the same amplitude, near phase resonance, while the base moves.
-struct Window<'a> {
-    cycles: &'a [Cycle],
-    samples: &'a [Sample],
-    /// Change of the amplitude in a period, m; 0 if it is noise.
-    change: f64,
-    /// Amplitude, m, by which the impacts follow the change late. These errors are alike in all windows of a stretch that change the same way.
-    late: f64,
-}
-
-/// Number of samples.
-fn count(cycles: &[Cycle]) -> usize {
-    cycles.iter().map(|cycle| cycle.samples).sum()
-}
-
-/// The windows of a stretch in which the base moves.
-fn windows<'a>(samples: &'a [Sample], cycles: &'a [Cycle]) -> Vec<Window<'a>> {
-    let (mut windows, mut rest, mut from) = (Vec::new(), cycles, 0);
-    while !rest.is_empty() {
-        let level = mean(rest.iter().take(LEAST).map(Cycle::amplitude));
-        let belongs = |(n, cycle): &(usize, &Cycle)| {
-            let [noise, base_noise] = cycle.noise.map(|variance| 4.0 * variance.sqrt());
-            let phase_noise = (noise / level).hypot(base_noise / cycle.base.norm());
-            let range = if *n < LEAST { RANGE } else { HELD };
-            (cycle.amplitude() - level).abs() <= (range * level).max(noise)
-                && cycle.phase_error.abs() <= PHASE_RANGE.max(phase_noise)
-        };
-        let length = rest.iter().enumerate().take_while(belongs).count();
-        let (taken, later) = rest.split_at(length.max(1));
-        if length >= LEAST {
-            // The impacts follow a move late.
-            let (before, cycles) = taken.split_at(if length >= 3 * LEAST { LEAST } else { 0 });
-            let samples = &samples[from + count(before)..from + count(taken)];
-            windows.push(Window { cycles, samples, change: change(cycles), late: 0.0 });
-        }
-        (rest, from) = (later, from + count(taken));
-    }
-    let changes: Vec<f64> = windows.iter().map(|window| window.change).collect();
-    for window in &mut windows {
-        let alike = changes.iter().filter(|change| **change * window.change > 0.0).count() as f64;
-        window.late = LAG * window.change * (alike - 1.0).max(0.0).sqrt();
-    }
-    windows
-}
-
-/// Amplitude of the response, m, drive, m, and frequency, rad/s.
-type Held = [f64; 3];
-
-/// The parts of the windows, which are evaluated twice: the points of the first time give the slopes of the second.
-fn evaluated(windows: &[Window], knowledge: &Knowledge) -> Vec<Part> {
-    let estimate = |window: &Window, before| {
-        let largest = window.cycles.iter().map(Cycle::amplitude).fold(0.0, f64::max);
-        Criterion { knowledge: *knowledge, precision: 1.0, largest, before }.best(window.cycles)
-    };
-    let held = |level: LevelEstimate| [level.response.value, level.at[0].value, level.at[1].value];
-    let first: Vec<Option<Held>> = windows
-        .iter()
-        .map(|window| estimate(window, [None; 2]).map(held))
-        .collect();
-    let mut curve: Vec<Held> = first.iter().copied().flatten().collect();
-    curve.sort_by(|first, second| first[0].total_cmp(&second[0]));
-    let second = windows.iter().zip(first).map(|(window, first)| {
-        let estimate = first.and_then(|first| estimate(window, neighbours(&curve, first)));
-        part(window, estimate, &curve, knowledge)
-    });
-    second.collect()
-}
-
-/// Leaves of points with about the same amplitude the best one: their errors are alike, whatever their number.
-fn best_of_each_amplitude(parts: &mut [Part]) {
-    let u = |point: &MeasuredPoint| point.drive.uncertainty / point.drive.value;
-    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
-    for part in parts {
-        let is_second = |point: &MeasuredPoint| {
-            let better = |next: &MeasuredPoint| {
-                (next.response.value / point.response.value - 1.0).abs() < HELD && u(next) < u(point)
-            };
-            points.iter().any(better)
-        };
-        part.point = part.point.filter(|point| !is_second(point));
-        part.candidate = part.candidate.filter(|point| !is_second(point));
+/// The ideal rig of a scene: what is expected of the one that was recorded.
+fn rough(scene: &Scene) -> IdealRig {
+    let of = |quantity: Quantity| quantity.of_plant(&scene.plant);
+    IdealRig {
+        f0: of(Quantity::F0),
+        zeta: of(Quantity::Zeta).max(LEAST_DAMPING),
+        r: of(Quantity::R),
+        b: of(Quantity::B),
+        epsilon: of(Quantity::Epsilon),
     }
 }
 
-/// Change of the amplitude in a period, m; 0 if it is noise.
-fn change(cycles: &[Cycle]) -> f64 {
-    let change = slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>());
-    let n = cycles.len() as f64;
-    let noise = (12.0 * mean(cycles.iter().map(|cycle| cycle.noise[0])) / n.powi(3)).sqrt();
-    if change.abs() > RANDOM * noise { change } else { 0.0 }
+/// A part of a recording with one motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stretch {
+    /// Its begin and end, s since the first sample.
+    pub seconds: [f64; 2],
+    /// Smallest and largest amplitude of the response, m.
+    pub response_m: [f64; 2],
+    /// The motion, of [`MOTIONS`].
+    pub motion: &'static str,
 }
 
-/// The two points whose amplitudes are next to that of `here`, the nearest last.
-fn neighbours(curve: &[Held], here: Held) -> [Option<Held>; 2] {
-    let mut others: Vec<Held> = curve
-        .iter()
-        .copied()
-        .filter(|point| (point[0] / here[0] - 1.0).abs() > 2.0 * HELD)
-        .collect();
-    others.sort_by(|first, second| (first[0] - here[0]).abs().total_cmp(&(second[0] - here[0]).abs()));
-    [others.get(1).copied(), others.first().copied()]
-}
-
-/// The part of a window.
-fn part(window: &Window, estimate: Option<LevelEstimate>, curve: &[Held], knowledge: &Knowledge) -> Part {
-    let Window { cycles, samples, change, late } = *window;
-    let seconds = [samples[0].time, samples[samples.len() - 1].time];
-    let Some(estimate) = estimate else {
-        let (kind, regime) = (Kind::Held, Regime::Unknown);
-        return Part { seconds, kind, point: None, candidate: None, regime };
-    };
-    let ([base, omega], level) = (estimate.at, estimate.response);
-    let samples = &samples[samples.len() - count(&cycles[cycles.len() - estimate.periods..])..];
-    let kind = if (change * cycles.len() as f64).abs() > 2.0 * HELD * level.value {
-        Kind::Sweep
-    } else {
-        Kind::Held
-    };
-    let regime = regime_by_response(samples, knowledge, base, omega);
-    // What the estimate contains once of the lag, and of the phase error in the second order.
-    let here = [level.value, base.value, omega.value];
-    let slopes = neighbours(curve, here)[1].map_or([0.0; 2], |neighbour| slopes(here, neighbour));
-    let beside = estimate.phase_error.value.abs() * base.value / level.value;
-    let aside = beside * (omega.value - knowledge.linear.omega0);
-    let drive = Estimate::new(base.value, &[base.uncertainty, slopes[0] * late, beside * base.value]);
-    let omega = Estimate::new(omega.value, &[omega.uncertainty, slopes[1] * late, aside]);
-    // Beyond the amplitude at which the symmetric motion loses its symmetry, noise hides another motion.
-    let manifold = Manifold::new(knowledge.numbers.r);
-    let largest = manifold.c(B_SYMMETRY_BREAKING) * knowledge.numbers.b;
-    let is_symmetric = regime == Regime::Symmetric || (regime == Regime::Unresolved && level.value < largest);
-    let is_another = matches!(regime, Regime::Other | Regime::Asymmetric | Regime::Unknown);
-    let candidate = point([level, drive, omega], knowledge.target.phase, &knowledge.linear).filter(|_| !is_another);
-    let point = candidate.filter(|_| is_symmetric);
-    Part { seconds, kind, point, candidate, regime }
-}
-
-/// A point from response, drive and frequency at a phase of the response relative to the base, rad, if its uncertainties are small enough.
-fn point(measured: [Estimate; 3], phase: f64, linear: &LinearResponse) -> Option<MeasuredPoint> {
-    let [response, drive, omega] = linear.resolved(measured);
-    let is_known = drive.uncertainty < LARGEST_DRIVE_UNCERTAINTY * drive.value && omega.uncertainty.is_finite();
-    (drive.value > 0.0 && is_known).then_some(MeasuredPoint { response, omega, drive, phase })
-}
-
-/// Slopes of drive and frequency over the amplitude.
-fn slopes(here: Held, neighbour: Held) -> [f64; 2] {
-    [1, 2].map(|i| (neighbour[i] - here[i]) / (neighbour[0] - here[0]))
-}
-
-/// The points of a decay, with `E = -A'/g`. The fits do not overlap.
-fn decay(anchors: &[Anchor], linear: &LinearResponse, sample_time: f64) -> Vec<Part> {
-    let apart = CLOCK_WINDOW.ceil() as usize;
-    let fits: Vec<(f64, Harmonic)> = anchors
-        .iter()
-        .step_by(apart)
-        .filter_map(|anchor| Some((anchor.middle * sample_time, anchor.response?)))
-        .collect();
-    let held = |harmonic: &Harmonic| {
-        let gain = 0.5 * linear.omega0 * linear.omega0 / harmonic.omega;
-        [harmonic.amplitude, -harmonic.rate / gain, harmonic.omega]
-    };
-    // The impacts have ended where what remains is the damping of the structure.
-    let damping = linear.damping_rate;
-    let taken = |harmonic: &Harmonic| -harmonic.rate - damping * harmonic.amplitude;
-    let at_first = fits.first().map_or(0.0, |(_, harmonic)| taken(harmonic));
-    // Without impacts nothing is taken but by an error of the damping.
-    let has_impacts = |harmonic: &Harmonic| taken(harmonic) > 0.5 * f64::max(at_first, damping * harmonic.amplitude);
-    let synchronous: Vec<_> = fits.iter().take_while(|(_, harmonic)| has_impacts(harmonic)).collect();
-    let count = synchronous.len() as f64;
-    let half = 0.5 * CLOCK_WINDOW * TAU / linear.omega0;
-    // The rest of the decay: the loss that the scene states may hide the impacts there.
-    let rest = &fits[synchronous.len().saturating_sub(1)..];
-    let rest = rest.first().zip(rest.last()).map(|((from, _), (to, _))| Part {
-        seconds: [from - half, to + half],
-        kind: Kind::Decay,
-        point: None,
-        candidate: None,
-        regime: Regime::NotEstablished,
-    });
-    synchronous
-        .windows(2)
-        .map(|pair| {
-            let [(time, harmonic), (_, next)] = [pair[0], pair[1]];
-            let here = held(harmonic);
-            let slopes = slopes(here, held(next));
-            let late = LAG * harmonic.rate * TAU / harmonic.omega;
-            let gain = -harmonic.rate / here[1];
-            // A misfit of one balance widens the other one as well: both have the same samples.
-            let units = [1.0, harmonic.amplitude / gain];
-            let systematic = (slopes[0] * late).hypot(units[1] * slopes[1] * late) * count.sqrt();
-            let [u_amplitude, u_omega] = harmonic.uncertainties;
-            let u_rate = u_omega * harmonic.amplitude;
-            let drive = Estimate::new(here[1], &[u_rate / gain, systematic]);
-            let omega = Estimate::new(harmonic.omega, &[u_omega, systematic / units[1]]);
-            let response = Estimate { value: harmonic.amplitude, uncertainty: u_amplitude };
-            // Without a drive, the motion is the one of phase resonance.
-            let point = point([response, drive, omega], -FRAC_PI_2, linear);
-            Part {
-                seconds: [time - half, time + half],
-                kind: Kind::Decay,
-                point,
-                candidate: point,
-                regime: Regime::Unresolved,
+impl Stretch {
+    /// Neighbouring windows with the same motion are one.
+    fn all(found: &Identified) -> Vec<Self> {
+        let mut all: Vec<Self> = Vec::new();
+        for (window, motion) in &found.motions {
+            let [from, to] = window.periods;
+            let seconds = [found.time[from], found.time[to - 1]];
+            match all.last_mut() {
+                Some(last) if last.motion == MOTIONS[*motion] => {
+                    last.seconds[1] = seconds[1];
+                    last.response_m = [last.response_m[0].min(window.amplitude), last.response_m[1].max(window.amplitude)];
+                }
+                _ => all.push(Self { seconds, response_m: [window.amplitude; 2], motion: MOTIONS[*motion] }),
             }
-        })
-        .chain(rest)
-        .collect()
+        }
+        all
+    }
+}
+
+/// Displacements, m, from velocities or accelerations: their integrals, without what changes slowly. `natural`: phase by which the natural frequency
+/// turns from sample to sample, rad.
+fn displacements(values: &[f64], of: Measurand, natural: f64) -> Vec<f64> {
+    let mut values = values.to_vec();
+    for _ in 0..of.order() {
+        let (mut sum, mut before) = (0.0, 0.0);
+        for value in &mut values {
+            // The trapezoidal rule, exact for a sine of this frequency.
+            sum += (0.5 * natural).tan() * (before + *value);
+            (before, *value) = (*value, sum);
+        }
+        remove_drift(&mut values, (TAU / natural).round() as usize);
+    }
+    values
 }

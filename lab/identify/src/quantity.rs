@@ -3,15 +3,50 @@
 use std::f64::consts::TAU;
 use std::str::FromStr;
 
-use serde::Serialize;
+use lovines::Parameters;
+use nalgebra::SVector;
 use vines_model::numerics::Estimate;
-use vines_model::{ArgumentError, Definition};
-
-use super::{
-    Fit, FitError, LinearDecay, MeasuredPoint, Problem, REJECTED, Unknowns, fit, gradient, probability, unknowns,
-};
+use vines_model::ArgumentError;
 use vines_scene::linear::{MeasuredLinear, ParticleState};
-use vines_scene::scene::Parameters;
+
+use crate::hypothesis::Hypothesis;
+
+/// Number of unknowns.
+pub(crate) const UNKNOWNS: usize = 7;
+/// The unknowns: the logarithm of omega0 (rad/s), zeta, r, the logarithms of b (m), epsilon and M (kg), and the strength of an effect.
+pub(crate) type Unknowns = SVector<f64, UNKNOWNS>;
+
+/// Step of a difference, relative or, of zeta and r, absolute: the curves are exact to 1e-12, and smooth.
+pub(crate) const STEP: f64 = 1e-6;
+
+/// The unknowns of a plant.
+pub(crate) fn unknowns(plant: &Parameters) -> Unknowns {
+    Unknowns::from([
+        plant.natural_frequency().ln(),
+        0.5 * plant.damping / (plant.stiffness * plant.primary_mass).sqrt(),
+        plant.restitution,
+        plant.half_width.ln(),
+        plant.mass_ratio().ln(),
+        plant.primary_mass.ln(),
+        0.0,
+    ])
+}
+
+/// The unknowns with one moved by a step; the strength of an effect by a share of itself.
+pub(crate) fn moved(x: &Unknowns, i: usize, step: f64) -> (Unknowns, f64) {
+    let step = if i == 6 && x[6] != 0.0 { step * x[6].abs() } else { step };
+    let mut x = *x;
+    x[i] += step;
+    (x, step)
+}
+
+/// The gradient of a quantity.
+pub(crate) fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
+    Unknowns::from_fn(|i, _| {
+        let ((low, below), (high, above)) = (moved(x, i, -STEP), moved(x, i, STEP));
+        (of(&high) - of(&low)) / (above - below)
+    })
+}
 
 /// A quantity of a rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,12 +104,12 @@ impl Quantity {
     }
 
     /// Whether the motion shows it only together with another mass, stiffness or damping.
-    pub(super) fn needs_a_scale(self) -> bool {
+    pub(crate) fn needs_a_scale(self) -> bool {
         !Self::FITTED.contains(&self)
     }
 
     /// The value at the unknowns.
-    pub(super) fn of(self, x: &Unknowns) -> f64 {
+    pub(crate) fn of(self, x: &Unknowns) -> f64 {
         let (omega0, mass) = (x[0].exp(), x[5].exp());
         match self {
             Self::F0 => omega0 / TAU,
@@ -96,7 +131,7 @@ impl Quantity {
     }
 
     /// The gradient over the unknowns.
-    pub(super) fn gradient(self, x: &Unknowns) -> Unknowns {
+    pub(crate) fn gradient(self, x: &Unknowns) -> Unknowns {
         gradient(x, |x| self.of(x))
     }
 }
@@ -111,6 +146,13 @@ pub enum Known {
         /// The value.
         estimate: Estimate,
     },
+    /// The strength of what a hypothesis adds, in the unit of [`Hypothesis::names`]: 0 excludes it.
+    Strength {
+        /// Of which.
+        hypothesis: Hypothesis,
+        /// The value.
+        estimate: Estimate,
+    },
     /// Natural frequency and damping ratio. While the state of the particle is unknown, they say nothing.
     Linear(MeasuredLinear),
 }
@@ -120,21 +162,17 @@ const EXACT_VALUE: f64 = 1e-9;
 
 impl Known {
     /// Whether it needs a mass.
-    pub(super) fn needs_a_scale(&self) -> bool {
+    pub(crate) fn needs_a_scale(&self) -> bool {
         matches!(self, Self::Value { quantity, .. } if quantity.needs_a_scale())
     }
 
-    /// Number of residuals.
-    pub(super) fn equations(&self) -> usize {
+    /// Independent residuals over their standard uncertainties. `strength`: of a hypothesis, 0 of all but the one that is fitted.
+    pub(crate) fn residuals(&self, x: &Unknowns, strength: impl Fn(Hypothesis) -> f64) -> Vec<f64> {
         match self {
-            Self::Value { .. } => 1,
-            Self::Linear(linear) => 2 * usize::from(linear.particle != ParticleState::Unknown),
-        }
-    }
-
-    /// Independent residuals over their standard uncertainties.
-    pub(super) fn residuals(&self, x: &Unknowns) -> Vec<f64> {
-        match self {
+            Self::Strength { hypothesis, estimate: Estimate { value, uncertainty } } => {
+                let uncertainty = uncertainty.max(EXACT_VALUE * value.abs()).max(f64::MIN_POSITIVE);
+                vec![(strength(*hypothesis) - value) / uncertainty]
+            }
             Self::Value { quantity, estimate: Estimate { value, uncertainty } } => {
                 let uncertainty = uncertainty.max(EXACT_VALUE * value.abs()).max(f64::MIN_POSITIVE);
                 vec![(quantity.of(x) - value) / uncertainty]
@@ -154,112 +192,39 @@ impl Known {
             }
         }
     }
-
-    /// Derivatives of the residuals by the unknowns.
-    pub(super) fn rows(&self, x: &Unknowns) -> Vec<Unknowns> {
-        (0..self.equations())
-            .map(|n| gradient(x, |x| self.residuals(x)[n]))
-            .collect()
-    }
-}
-
-impl From<LinearDecay> for MeasuredLinear {
-    /// A decay does not tell the state of the particle.
-    fn from(decay: LinearDecay) -> Self {
-        let f0 = decay.omega.scaled(1.0 / TAU);
-        Self {
-            f0: f0.value,
-            u_f0: f0.uncertainty,
-            zeta: decay.zeta.value,
-            u_zeta: decay.zeta.uncertainty,
-            correlation: 0.0,
-            particle: ParticleState::Unknown,
-        }
-    }
-}
-
-/// What the points say of a linear response that was measured beside them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct LinearVerdict {
-    /// The linear response. Its state is known if the fit takes it.
-    pub linear: MeasuredLinear,
-    /// Rise of the chi-square of the points by these data if the particle was carried along, and if it was free; absent for a state that the
-    /// measurement excludes.
-    pub rises: [Option<f64>; 2],
-}
-
-impl LinearVerdict {
-    /// Whether a state agrees with the points: the probability of a larger rise, of two degrees of freedom, is at least 1 %.
-    #[must_use]
-    pub fn agrees(&self) -> [bool; 2] {
-        let is_likely = |rise: f64| probability(rise, 2.0).is_some_and(|p| p >= REJECTED);
-        self.rises.map(|rise| rise.is_some_and(is_likely))
-    }
-}
-
-/// What the points say of the linear responses `linear`: data of the fit if exactly one state of the particle agrees with the points.
-///
-/// # Errors
-/// As [`fit`].
-pub fn linear_verdicts(
-    linear: &[MeasuredLinear],
-    points: &[MeasuredPoint],
-    definition: Definition,
-    expected: &Parameters,
-    known: &[Known],
-) -> Result<Vec<LinearVerdict>, FitError> {
-    if linear.is_empty() {
-        return Ok(Vec::new());
-    }
-    let alone = fit(points, definition, expected, known)?;
-    let kept = (0..points.len()).filter(|n| !alone.left_out.contains(n));
-    let kept: Vec<MeasuredPoint> = kept.map(|n| points[n]).collect();
-    let with = |linear: MeasuredLinear| -> Option<Fit> {
-        let known = [known, &[Known::Linear(linear)]].concat();
-        let problem = Problem::new(kept.clone(), definition, &known);
-        problem.fit_from([alone.x].into_iter()).ok()
-    };
-    let verdict = |linear: &MeasuredLinear| {
-        let is_possible = |particle| [particle, ParticleState::Unknown].contains(&linear.particle);
-        let states = [ParticleState::Carried, ParticleState::Free];
-        let rises = states.map(|particle| {
-            let rise = |fit: Fit| fit.chi_square - alone.chi_square;
-            is_possible(particle).then(|| with(MeasuredLinear { particle, ..*linear }).map_or(f64::INFINITY, rise))
-        });
-        let found = LinearVerdict { linear: *linear, rises };
-        let particle = match found.agrees() {
-            [true, false] => ParticleState::Carried,
-            [false, true] => ParticleState::Free,
-            _ => ParticleState::Unknown,
-        };
-        LinearVerdict { linear: MeasuredLinear { particle, ..*linear }, rises }
-    };
-    Ok(linear.iter().map(verdict).collect())
 }
 
 impl FromStr for Known {
     type Err = ArgumentError;
 
     fn from_str(text: &str) -> Result<Self, ArgumentError> {
-        let symbols = Quantity::ALL.map(|quantity| quantity.symbol()[0]).join(", ");
+        let quantities = Quantity::ALL.map(|quantity| quantity.symbol()[0]);
+        let strengths = Hypothesis::ALL.map(|hypothesis| hypothesis.names()[1]);
+        let symbols = quantities.into_iter().chain(strengths).filter(|symbol| !symbol.is_empty());
+        let symbols = symbols.collect::<Vec<_>>().join(", ");
         let form = || {
             format!("`{text}`: expected SYMBOL=VALUE±UNCERTAINTY, for instance m=0.032±0.0005, with one of {symbols}")
         };
         let (symbol, numbers) = text.split_once('=').ok_or_else(form)?;
-        let quantity = Quantity::ALL
-            .into_iter()
-            .find(|quantity| quantity.symbol()[0] == symbol.trim())
-            .ok_or_else(form)?;
+        let symbol = symbol.trim();
+        let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.symbol()[0] == symbol);
+        let is_its = |hypothesis: &Hypothesis| !symbol.is_empty() && hypothesis.names()[1] == symbol;
+        let hypothesis = Hypothesis::ALL.into_iter().find(is_its);
         let (value, uncertainty) = numbers
             .split_once('±')
             .or(numbers.split_once("+-"))
             .unwrap_or((numbers, "0"));
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
         let (value, uncertainty) = number(value).zip(number(uncertainty)).ok_or_else(form)?;
-        let may_be_0 = matches!(quantity, Quantity::Zeta | Quantity::Damping);
+        let may_be_0 = matches!(quantity, None | Some(Quantity::Zeta | Quantity::Damping));
         if uncertainty < 0.0 || value < 0.0 || (value == 0.0 && !may_be_0) {
             return Err(format!("`{text}`: the value must be positive, and its uncertainty positive or 0").into());
         }
-        Ok(Self::Value { quantity, estimate: Estimate { value, uncertainty } })
+        let estimate = Estimate { value, uncertainty };
+        match (quantity, hypothesis) {
+            (Some(quantity), _) => Ok(Self::Value { quantity, estimate }),
+            (_, Some(hypothesis)) => Ok(Self::Strength { hypothesis, estimate }),
+            _ => Err(form().into()),
+        }
     }
 }

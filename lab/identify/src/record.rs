@@ -1,5 +1,7 @@
 //! Parameters of an ideal cavity from a record: regimes, curve and fit in turn, until the linear response stays.
 
+use std::collections::BTreeSet;
+
 use nalgebra::SVector;
 use num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -41,6 +43,8 @@ pub struct Identified {
     pub used: Vec<bool>,
     /// Times of the middles of all periods, s.
     pub time: Vec<f64>,
+    /// Amplitudes of the response in all periods, m.
+    pub amplitude: Vec<f64>,
     /// The windows and their most probable motions.
     pub motions: Vec<(Window, usize)>,
     /// Factor of the particle's lag: 1 if its closed form holds.
@@ -164,8 +168,24 @@ impl Samples<'_> {
     }
 }
 
-/// Regimes, curve and parameters, from samples and a rough scene. `None` without at least thirty periods of symmetric 1:1 motion.
-pub fn identify(samples: &Samples, rough: &IdealRig) -> Option<Identified> {
+/// Why a record has no curve: the motions of its windows, if these are not symmetric 1:1 for at least thirty periods; otherwise too little of it
+/// is smooth.
+#[derive(Debug, Clone, Default)]
+pub struct Unidentified {
+    /// Numbers of [`crate::MOTIONS`], each once.
+    pub motions: BTreeSet<usize>,
+}
+
+/// Regimes, curve and parameters, from samples and a rough scene.
+///
+/// # Errors
+/// Fewer than thirty periods of symmetric 1:1 motion.
+pub fn identify(samples: &Samples, rough: &IdealRig) -> Result<Identified, Unidentified> {
+    let mut motions = BTreeSet::new();
+    passes(samples, rough, &mut motions).ok_or(Unidentified { motions })
+}
+
+fn passes(samples: &Samples, rough: &IdealRig, found: &mut BTreeSet<usize>) -> Option<Identified> {
     let mut scene = rough_scene(&samples.record(rough)?, rough);
     for pass in 1..=PASSES {
         let record = samples.record(&scene)?;
@@ -174,6 +194,7 @@ pub fn identify(samples: &Samples, rough: &IdealRig) -> Option<Identified> {
         let tolerance = TOLERANCES[usize::from(pass > 1)];
         let expected = Expected { particle, host: Complex64::ZERO, tolerance, scale };
         let (used, motions) = one_to_one(&record, &expected);
+        *found = motions.iter().map(|(_, motion)| *motion).collect();
         if used.iter().filter(|one| **one).count() < FEWEST_PERIODS {
             return None;
         }
@@ -195,6 +216,7 @@ pub fn identify(samples: &Samples, rough: &IdealRig) -> Option<Identified> {
                 curve,
                 used: estimate.used.clone(),
                 time: record.periods.time.clone(),
+                amplitude: record.periods.response.iter().map(|z| z.norm()).collect(),
                 motions,
                 lag: estimate.lag,
                 innovations: solution.innovations,
