@@ -238,6 +238,10 @@ pub struct HypothesisReport {
     pub strength: Option<f64>,
     /// Standard uncertainty of its strength.
     pub u_strength: Option<f64>,
+    /// Coefficient of the friction beside it.
+    pub friction: Option<f64>,
+    /// Standard uncertainty of the friction.
+    pub u_friction: Option<f64>,
     /// Its parameters.
     pub parameters: Vec<FittedParameter>,
     /// Chi-square of each channel.
@@ -321,6 +325,8 @@ impl Found {
                 unit,
                 strength: fit.strength().map(|one| one.value),
                 u_strength: fit.strength().map(|one| one.uncertainty),
+                friction: fit.friction().map(|one| one.value),
+                u_friction: fit.friction().map(|one| one.uncertainty),
                 parameters: parameters(expected, |quantity| fit.estimate(quantity)),
                 channels: fit.channels.iter().map(channel).collect(),
                 chi_square: fit.chi_square,

@@ -106,6 +106,31 @@ impl Curve {
         Resonance { drive, omega: frequency, covariance }
     }
 
+    /// The curve as it is stated: beside noise, drive and amplitude have a relative standard uncertainty of `share`, and the frequency that share of the
+    /// half-power bandwidth. The errors of the functions are independent. `None` where rounding leaves no covariance.
+    pub fn resolved(mut self, share: f64) -> Option<Self> {
+        // The amplitude at which each function counts most.
+        let amplitudes: Vec<f64> = self.basis.spread(self.basis.size).map(f64::exp).collect();
+        let at = self.at(&amplitudes);
+        let variance = |n: usize| {
+            let (amplitude, drive) = (amplitudes[n / 2], at.drive[n / 2]);
+            let of = match n % 2 {
+                // The force that moves the frequency: A (1 - w²).
+                0 => 4.0 * self.linear.zeta * amplitude,
+                _ => std::f64::consts::SQRT_2 * drive,
+            };
+            (share * of).powi(2)
+        };
+        let floor = DMatrix::from_diagonal(&DVector::from_fn(self.covariance.nrows(), |n, _| variance(n)));
+        self.covariance += &floor;
+        let rows = self.information.nrows();
+        let of_rows = DMatrix::identity(rows, rows) + &self.information * floor * self.information.transpose();
+        let whitened = of_rows.cholesky()?.l();
+        self.information = whitened.solve_lower_triangular(&self.information)?;
+        self.expected = whitened.solve_lower_triangular(&self.expected)?;
+        Some(self)
+    }
+
     /// What the record contradicts in a backbone: residuals of variance 1. Beyond its ends the backbone's force continues as it ends. `None` for
     /// fewer than four points.
     pub fn residuals(&self, backbone: &[[f64; 3]]) -> Option<DVector<f64>> {

@@ -53,12 +53,13 @@ impl Branch {
     }
 
     /// Of an ideal cavity with these numbers, from just beyond the fold. The variable is the root of the speed of the particle, over `b omega`, beyond
-    /// the slowest: the curve bends most at the fold.
-    pub fn ideal(numbers: &Dimensionless) -> Option<Self> {
+    /// the slowest: the curve bends most at the fold. `changed`: what is changed in amplitude, m, frequency, rad/s, and drive, m.
+    pub fn ideal(numbers: &Dimensionless, changed: impl Fn([f64; 3]) -> [f64; 3]) -> Option<Self> {
         let slowest = BEYOND_THE_FOLD * Manifold::new(numbers.r).b_min();
         let place = |root: f64| {
             let [omega, c, g] = backbone_at_speed(numbers, slowest + root * root)?;
-            Some(Vector3::new(c * numbers.b, omega * numbers.omega0, g * numbers.b * numbers.epsilon))
+            let place = [c * numbers.b, omega * numbers.omega0, g * numbers.b * numbers.epsilon];
+            Some(changed(place).into())
         };
         let roots: Vec<f64> = equally_spaced(0.0, (FASTEST - slowest).sqrt(), PLACES).collect();
         let places: Option<Vec<Vector3<f64>>> = roots.iter().map(|root| place(*root)).collect();
@@ -95,12 +96,6 @@ impl Branch {
             }
         }
         rising
-    }
-
-    /// The curve with frequency and drive changed by a function of the amplitude and these.
-    pub fn changed(&self, change: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Option<Self> {
-        let places: Vec<Vector3<f64>> = self.knots.iter().map(|s| change(self.at(*s)[0])).collect();
-        Self::new(self.knots.clone(), &places)
     }
 }
 

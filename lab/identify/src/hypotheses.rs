@@ -20,7 +20,7 @@ use vines_model::numerics::{Estimate, LeastSquares, Misfit, Regression, SIGNIFIC
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 
 use crate::branch::Branch;
-use crate::hypothesis::{Hypothesis, impact_speed, plant};
+use crate::hypothesis::{Hypothesis, STRENGTHS, impact_speed, plant};
 use crate::motions::{AMPLITUDES, Goal, Motions, Place, backbone, uncertainties};
 use crate::points::MeasuredPoint;
 use crate::quantity::{Known, Quantity, STEP, UNKNOWNS, Unknowns, gradient, moved, unknowns};
@@ -135,6 +135,7 @@ pub struct Fit {
     pub(crate) x: Unknowns,
     covariance: nalgebra::SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     has_scale: bool,
+    has_friction: bool,
     /// Speed of the impacts, m/s, at which a law of restitution has the value r.
     speed: f64,
     /// Chi-square.
@@ -171,11 +172,18 @@ impl Fit {
     /// The strength of what the hypothesis adds, in the unit of [`Hypothesis::names`].
     #[must_use]
     pub fn strength(&self) -> Option<Estimate> {
-        let value = |x: &Unknowns| self.hypothesis.strength(x[6], x[2], self.speed);
+        let value = |x: &Unknowns| self.hypothesis.strength([x[6], x[7]], x[2], self.speed);
         let gradient = gradient(&self.x, value);
         let variance = (gradient.transpose() * self.covariance * gradient)[0];
         (self.hypothesis != Hypothesis::Ideal)
             .then(|| Estimate { value: value(&self.x), uncertainty: variance.max(0.0).sqrt() })
+    }
+
+    /// The friction, where it acts beside another effect.
+    #[must_use]
+    pub fn friction(&self) -> Option<Estimate> {
+        let acts = self.hypothesis != Hypothesis::Friction && self.has_friction;
+        acts.then(|| Estimate { value: self.x[6], uncertainty: self.covariance[(6, 6)].max(0.0).sqrt() })
     }
 
     /// The probability of a larger chi-square if the hypothesis is right; `None` without a degree of freedom.
@@ -191,7 +199,7 @@ impl Fit {
         if !self.has_scale {
             x[5] = scene.primary_mass.ln();
         }
-        plant(&x, self.hypothesis.cavity(x[6], x[2], self.speed))
+        plant(&x, self.hypothesis.cavity([x[6], x[7]], x[2], self.speed))
     }
 
     /// Why its own data reject it.
@@ -296,7 +304,7 @@ impl Data {
     pub fn apart(&self, fit: &Fit) -> Vec<[f64; 3]> {
         let problem = self.problem(fit.hypothesis, fit.x);
         let spline = problem.start(&fit.x).and_then(|start| {
-            let backbone = problem.curves(&fit.x, &start)?;
+            let backbone = problem.at(&fit.x, &start)?.backbone;
             let values = backbone.iter().map(|[_, drive, omega]| Complex64::new(*omega, *drive)).collect();
             (backbone.len() > 3).then(|| CubicSpline::new(backbone.iter().map(|one| one[0]).collect(), values))
         });
@@ -390,13 +398,23 @@ impl Data {
             if self.is_excluded(hypothesis) {
                 continue;
             }
-            let start = |strength: f64| {
-                let mut x = if hypothesis == Hypothesis::Spring { self.linear(expected) } else { x };
-                x[6] = strength;
+            let start = if hypothesis.is_cavity() { x } else { self.linear(expected) };
+            let friction = fits.iter().find(|fit| fit.hypothesis == Hypothesis::Friction).map(|fit| fit.x);
+            let with = |share: f64| {
+                let mut x = start;
+                (x[6], x[7]) = (Hypothesis::Friction.start(&x, share), hypothesis.start(&x, share));
                 x
             };
-            let problem = self.problem(hypothesis, start(0.0));
-            fits.extend(problem.best(hypothesis.starts(&x).into_iter().map(start)));
+            let problem = self.problem(hypothesis, start);
+            let starts: Vec<Unknowns> = match (problem.has_motions(), friction) {
+                (false, _) => vec![start],
+                (true, None) => STRENGTHS.map(with).to_vec(),
+                (true, Some(mut x)) => {
+                    x[7] = hypothesis.start(&x, STRENGTHS[0]);
+                    vec![x, with(STRENGTHS[1])]
+                }
+            };
+            fits.extend(problem.best(starts.into_iter()));
         }
         let least = fits.iter().map(|fit| fit.chi_square).fold(f64::INFINITY, f64::min);
         let fewest = fits.iter().filter(|fit| fit.chi_square == least).map(|fit| fit.degrees).max().unwrap_or(0);
@@ -410,7 +428,7 @@ impl Data {
         Ok(Hypotheses { fits })
     }
 
-    /// Whether a strength of 0 is known.
+    /// Whether it is known that something does not act.
     fn is_excluded(&self, hypothesis: Hypothesis) -> bool {
         let zero = Known::Strength { hypothesis, estimate: Estimate { value: 0.0, uncertainty: 0.0 } };
         self.known.contains(&zero)
@@ -475,7 +493,7 @@ impl Data {
         });
         let (_, [omega0, zeta, r, b, epsilon]) = fits.min_by(|first, second| first.0.total_cmp(&second.0))?;
         let mass = expected.primary_mass.ln();
-        Some(Unknowns::from([omega0.ln(), zeta, r, b.ln(), epsilon.ln(), mass, 0.0]))
+        Some(Unknowns::from([omega0.ln(), zeta, r, b.ln(), epsilon.ln(), mass, 0.0, 0.0]))
     }
 
     fn problem(&self, hypothesis: Hypothesis, x: Unknowns) -> Problem<'_> {
@@ -532,17 +550,27 @@ struct AtData {
 
 impl Problem<'_> {
     fn is_free(&self, i: usize) -> bool {
-        self.hypothesis.is_free(i) || (i == 5 && self.has_scale)
+        match i {
+            5 => self.has_scale,
+            6 => self.hypothesis.is_free(6) && !self.data.is_excluded(Hypothesis::Friction),
+            _ => self.hypothesis.is_free(i),
+        }
+    }
+
+    /// Whether the curve has no closed form.
+    fn has_motions(&self) -> bool {
+        self.hypothesis.acts_on_particle() || self.is_free(6)
     }
 
     fn motions(&self, x: &Unknowns) -> Option<Motions<'_>> {
-        let plant = plant(x, self.hypothesis.cavity(x[6], x[2], self.speed));
-        (0.0 < x[2] && x[2] <= 1.0).then(|| Motions { plant, definition: self.data.definition, goals: &self.goals })
+        let plant = plant(x, self.hypothesis.cavity([x[6], x[7]], x[2], self.speed));
+        let (hypothesis, definition) = (self.hypothesis, self.data.definition);
+        (0.0 < x[2] && x[2] <= 1.0).then(|| Motions { hypothesis, x: *x, plant, definition, goals: &self.goals })
     }
 
     /// Places from which the curve is followed; none where it has a closed form.
     fn start(&self, x: &Unknowns) -> Option<Vec<Place>> {
-        match self.hypothesis.has_motions() {
+        match self.has_motions() {
             true => self.motions(x)?.along(),
             false => Some(Vec::new()),
         }
@@ -576,11 +604,11 @@ impl Problem<'_> {
         }
     }
 
-    /// The curve by rising amplitude.
-    fn curves(&self, x: &Unknowns, places: &[Place]) -> Option<Backbone> {
-        match self.hypothesis.has_motions() {
-            true => Some(self.of_places(places).backbone),
-            false => Some(self.closed(x)?.backbone),
+    /// The curve at the data.
+    fn at(&self, x: &Unknowns, places: &[Place]) -> Option<AtData> {
+        match self.has_motions() {
+            true => Some(self.of_places(places)),
+            false => self.closed(x),
         }
     }
 
@@ -598,12 +626,12 @@ impl Problem<'_> {
 
     /// Residuals of what is known, and of the unknowns that are held.
     fn of_known(&self, x: &Unknowns) -> Vec<f64> {
-        let strength = |hypothesis: Hypothesis| match hypothesis == self.hypothesis {
-            true => hypothesis.strength(x[6], x[2], self.speed),
+        let strength = |effect: Hypothesis| match effect == self.hypothesis || effect == Hypothesis::Friction {
+            true => effect.strength([x[6], x[7]], x[2], self.speed),
             false => 0.0,
         };
         let known = self.data.known.iter().flat_map(|known| known.residuals(x, &strength));
-        let calibration = (self.hypothesis == Hypothesis::Reference).then(|| x[6] / self.data.calibration);
+        let calibration = (self.hypothesis == Hypothesis::Reference).then(|| x[7] / self.data.calibration);
         let held = (0..UNKNOWNS).filter(|i| !self.is_free(*i)).map(|i| x[i] - self.held[i]);
         known.chain(calibration).chain(held).collect()
     }
@@ -617,7 +645,7 @@ impl Problem<'_> {
 
     /// The smallest of the minima that are reached from these starts.
     fn best(&self, starts: impl Iterator<Item = Unknowns>) -> Option<Fit> {
-        let gain = LEAST_GAIN[usize::from(self.hypothesis.has_motions())];
+        let gain = LEAST_GAIN[usize::from(self.has_motions())];
         let minima = starts.filter_map(|x| LeastSquares::minimum(self, x, &self.start(&x)?, gain));
         let minimum = minima.min_by(|first, second| first.chi_square.total_cmp(&second.chi_square))?;
         self.found(&minimum)
@@ -628,10 +656,7 @@ impl Problem<'_> {
         let covariance = minimum.covariance();
         let free = (0..UNKNOWNS).filter(|i| self.is_free(*i)).count();
         let count = self.data.points.len();
-        let at = match self.hypothesis.has_motions() {
-            true => self.of_places(&minimum.trace),
-            false => self.closed(&minimum.x)?,
-        };
+        let at = self.at(&minimum.x, &minimum.trace)?;
         let alongs: Vec<Vector3<f64>> = at.apart.iter().map(|[_, along]| along.normalize()).collect();
         // The covariance of the residuals is what remains of the unit matrix beside the directions that the fit can follow.
         let test = |name: String, rows: &[usize], beside: &dyn Fn(usize) -> f64| {
@@ -661,6 +686,7 @@ impl Problem<'_> {
             x: minimum.x,
             covariance,
             has_scale: self.has_scale,
+            has_friction: self.is_free(6),
             speed: self.speed,
             chi_square: minimum.chi_square,
             degrees: self.equations().saturating_sub(free),
@@ -681,27 +707,21 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
     type Trace = Vec<Place>;
 
     fn residuals(&self, x: &Unknowns, near: &Vec<Place>) -> Option<(Vec<f64>, Vec<Place>)> {
-        let (at, places) = match self.hypothesis.has_motions() {
-            true => {
-                let places = self.motions(x)?.near(near)?;
-                (self.of_places(&places), places)
-            }
-            false => (self.closed(x)?, Vec::new()),
+        let places = match self.has_motions() {
+            true => self.motions(x)?.near(near)?,
+            false => Vec::new(),
         };
-        let mut residuals = self.of_data(&at)?;
+        let mut residuals = self.of_data(&self.at(x, &places)?)?;
         residuals.extend(self.of_known(x));
         Some((residuals, places))
     }
 
     fn derivatives(&self, x: &Unknowns, places: &Vec<Place>) -> Option<Vec<Unknowns>> {
-        let (has_motions, step) = match self.hypothesis.has_motions() {
-            true => (true, MOTION_STEP),
-            false => (false, STEP),
-        };
-        let here = if has_motions { self.of_places(places) } else { self.closed(x)? };
+        let step = if self.has_motions() { MOTION_STEP } else { STEP };
+        let here = self.at(x, places)?;
         // Of motions only what is perpendicular to the curve of `x` counts.
         let of_data = |x: &Unknowns| {
-            let mut at = match has_motions {
+            let mut at = match self.has_motions() {
                 true => self.of_places(&self.motions(x)?.beside(places)?),
                 false => self.closed(x)?,
             };
@@ -732,7 +752,11 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
         let mut limits = [[f64::NEG_INFINITY, f64::INFINITY]; UNKNOWNS];
         limits[1] = [0.0, 1.0];
         limits[2] = [1e-3, 1.0];
-        limits[6][0] = self.hypothesis.smallest();
+        // Neither friction nor the square of a tilt is negative.
+        limits[6][0] = 0.0;
+        if self.hypothesis == Hypothesis::Tilt {
+            limits[7][0] = 0.0;
+        }
         limits
     }
 }

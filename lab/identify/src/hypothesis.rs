@@ -8,7 +8,7 @@ use vines_model::{Definition, Dimensionless};
 use crate::branch::{self, Branch};
 use crate::quantity::{Quantity, Unknowns};
 
-/// What may be true of a rig.
+/// What may be true of a rig. Friction acts beside every other effect: half-width and mass ratio make up for it, so that data rarely exclude it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hypothesis {
     /// An ideal cavity.
@@ -30,9 +30,9 @@ pub enum Hypothesis {
     Spring,
 }
 
-/// Strengths from which a search begins, over that which gives the particle the acceleration `b omega0²`, or the suspension the additional stiffness
-/// `m omega0²`: typical, weak, strong. A typical friction and tilt are about 0.03 and 2 degrees on the default rig.
-const STRENGTHS: [f64; 3] = [0.01, 0.001, 0.05];
+/// Strengths from which a search begins, typical, weak and strong, over that which gives the particle the acceleration `b omega0²`: a typical
+/// friction and tilt are about 0.03 and 2 degrees on the default rig.
+pub(crate) const STRENGTHS: [f64; 3] = [0.01, 0.001, 0.05];
 
 impl Hypothesis {
     /// All of them.
@@ -68,63 +68,49 @@ impl Hypothesis {
         self != Self::Spring
     }
 
-    /// Whether its motions are those of the plant with an effect, which have no closed form.
-    pub(crate) fn has_motions(self) -> bool {
-        matches!(self, Self::Friction | Self::Tilt | Self::Viscoelastic | Self::Plastic)
-    }
-
     /// Which unknowns it determines. A law of restitution stands for r.
     pub(crate) fn is_free(self, i: usize) -> bool {
         match i {
             0 | 1 => true,
             2..=4 => self.is_cavity(),
-            6 => !matches!(self, Self::Ideal | Self::Viscoelastic | Self::Plastic),
+            6 => self.is_cavity() && self != Self::Ideal,
+            7 => matches!(self, Self::Tilt | Self::Cubic | Self::Reference | Self::Spring),
             _ => false,
         }
     }
 
-    /// Strengths from which a search begins.
-    pub(crate) fn starts(self, x: &Unknowns) -> Vec<f64> {
-        let strength = |share: f64| {
-            let over_gravity = share * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
-            match self {
-                Self::Friction => over_gravity,
-                Self::Tilt => 4.0 * over_gravity * over_gravity,
-                _ => 0.0,
-            }
-        };
+    /// Whether it acts on the particle.
+    pub(crate) fn acts_on_particle(self) -> bool {
+        matches!(self, Self::Tilt | Self::Viscoelastic | Self::Plastic)
+    }
+
+    /// The friction, or of tilt its square in rad², from which a search begins at a share of what gives the particle the acceleration `b omega0²`.
+    pub(crate) fn start(self, x: &Unknowns, share: f64) -> f64 {
+        let over_gravity = share * x[3].exp() * x[0].exp().powi(2) / GRAVITY;
         match self {
-            Self::Friction | Self::Tilt => STRENGTHS.map(strength).to_vec(),
-            _ => vec![0.0],
+            Self::Friction => over_gravity,
+            Self::Tilt => 4.0 * over_gravity * over_gravity,
+            _ => 0.0,
         }
     }
 
-    /// Smallest strength: neither friction nor the square of a tilt is negative.
-    pub(crate) fn smallest(self) -> f64 {
+    /// The cavity. `friction` is the coefficient, and `strength` the square of the tilt, rad² (the motions are even in it); a law of restitution has the
+    /// value `r` at the impact speed `speed`, m/s.
+    pub(crate) fn cavity(self, [friction, strength]: [f64; 2], r: f64, speed: f64) -> Cavity {
+        let with = Cavity { kinetic_friction: friction.max(0.0), ..Cavity::IDEAL };
+        let both = |law| Cavity { restitution: [Some(law); 2], ..with };
         match self {
-            Self::Friction | Self::Tilt => 0.0,
-            _ => f64::NEG_INFINITY,
+            Self::Tilt => Cavity { tilt: strength.max(0.0).sqrt(), ..with },
+            Self::Viscoelastic => both(Restitution::Viscoelastic(self.strength([friction, strength], r, speed))),
+            Self::Plastic => both(Restitution::Plastic(self.strength([friction, strength], r, speed))),
+            _ => with,
         }
     }
 
-    /// The cavity with this effect. `strength` is the friction, or the square of the tilt, rad² (the motions are even in it); a law of restitution
-    /// has the value `r` at the impact speed `speed`, m/s.
-    #[must_use]
-    pub fn cavity(self, strength: f64, r: f64, speed: f64) -> Cavity {
-        let both = |law| Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL };
+    /// The strength in the unit of [`Hypothesis::names`].
+    pub(crate) fn strength(self, [friction, strength]: [f64; 2], r: f64, speed: f64) -> f64 {
         match self {
-            Self::Friction => Cavity { kinetic_friction: strength, ..Cavity::IDEAL },
-            Self::Tilt => Cavity { tilt: strength.max(0.0).sqrt(), ..Cavity::IDEAL },
-            Self::Viscoelastic => both(Restitution::Viscoelastic(self.strength(strength, r, speed))),
-            Self::Plastic => both(Restitution::Plastic(self.strength(strength, r, speed))),
-            _ => Cavity::IDEAL,
-        }
-    }
-
-    /// The strength in the unit of [`Hypothesis::names`], of what [`Hypothesis::cavity`] takes.
-    #[must_use]
-    pub fn strength(self, strength: f64, r: f64, speed: f64) -> f64 {
-        match self {
+            Self::Friction => friction,
             Self::Tilt => strength.max(0.0).sqrt().to_degrees(),
             Self::Viscoelastic => (1.0 - r) / speed.powf(0.2),
             Self::Plastic => speed * r.powi(4),
@@ -132,21 +118,23 @@ impl Hypothesis {
         }
     }
 
-    /// Its curve, where it has a closed form.
-    pub(crate) fn branch(self, x: &Unknowns, definition: Definition, range: [f64; 2]) -> Option<Branch> {
-        let ideal = || Branch::ideal(&numbers(x, definition));
+    /// What it changes in a place of the curve, amplitude m, frequency rad/s and drive m, beside the particle.
+    pub(crate) fn changed(self, x: &Unknowns, [amplitude, omega, drive]: [f64; 3]) -> [f64; 3] {
         match self {
-            Self::Ideal => ideal(),
-            Self::Cubic => ideal()?.changed(|mut place| {
-                place[1] *= 1.0 + 0.375 * x[6] * (place[0] / x[3].exp()).powi(2);
-                place
-            }),
-            Self::Reference => ideal()?.changed(|mut place| {
-                place[2] *= 1.0 + x[6];
-                place
-            }),
-            Self::Spring => branch::spring([x[0].exp(), x[1], x[6], x[3].exp()], definition, range),
-            Self::Friction | Self::Tilt | Self::Viscoelastic | Self::Plastic => None,
+            Self::Cubic => {
+                let ratio = amplitude / x[3].exp();
+                [amplitude, omega * (1.0 + 0.375 * x[7] * ratio * ratio), drive]
+            }
+            Self::Reference => [amplitude, omega, drive * (1.0 + x[7])],
+            _ => [amplitude, omega, drive],
+        }
+    }
+
+    /// Its curve in closed form, without friction.
+    pub(crate) fn branch(self, x: &Unknowns, definition: Definition, range: [f64; 2]) -> Option<Branch> {
+        match self {
+            Self::Spring => branch::spring([x[0].exp(), x[1], x[7], x[3].exp()], definition, range),
+            _ => Branch::ideal(&numbers(x, definition), |place| self.changed(x, place)),
         }
     }
 }

@@ -9,7 +9,9 @@ use vines_estimate::Backbone;
 use vines_model::Definition;
 use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
 
+use crate::hypothesis::Hypothesis;
 use crate::points::MeasuredPoint;
+use crate::quantity::Unknowns;
 
 /// What a motion is looked for near to.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +42,8 @@ impl Goal {
 #[derive(Debug, Clone)]
 pub(crate) struct Place {
     motion: PlantMotion,
+    /// Response, frequency and drive, with what is changed beside the particle.
+    values: Vector3<f64>,
     /// Direction of the curve: change of the response over b and of the frequency over epsilon omega0, a unit vector.
     tangent: [f64; 2],
     /// Change of response, frequency and drive along the curve.
@@ -61,6 +65,10 @@ const DIFFERENCE: f64 = 1e-4;
 
 /// A plant whose curve is followed.
 pub(crate) struct Motions<'a> {
+    /// What is true of it.
+    pub hypothesis: Hypothesis,
+    /// Its unknowns.
+    pub x: Unknowns,
     /// The plant.
     pub plant: Parameters,
     /// What counts as resonance.
@@ -73,6 +81,11 @@ impl Motions<'_> {
     /// b, m, and epsilon omega0, rad/s.
     fn units(&self) -> [f64; 2] {
         [self.plant.half_width, self.plant.mass_ratio() * self.plant.natural_frequency()]
+    }
+
+    fn values(&self, motion: &PlantMotion) -> Vector3<f64> {
+        let place = [motion.response.norm(), motion.omega, motion.amplitude];
+        self.hypothesis.changed(&self.x, place).into()
     }
 
     /// The motion of goal `n` near `near` on the line across the curve, `ahead` of it.
@@ -100,9 +113,10 @@ impl Motions<'_> {
             (next.omega - motion.omega) / rate,
         ];
         let size = change[0].hypot(change[1]);
-        let along = (values(&next) - values(&motion)) / size;
+        let values = self.values(&motion);
+        let along = (self.values(&next) - values) / size;
         let tangent = change.map(|component| component / size);
-        Some(Place { motion, tangent, along, is_found: true })
+        Some(Place { motion, values, tangent, along, is_found: true })
     }
 
     /// The motions with the amplitudes of the goals, or at the fold, from the largest one along the curve.
@@ -140,7 +154,7 @@ impl Motions<'_> {
             return place;
         };
         match self.on_line(n, &place.motion, [amplitude, place.motion.omega], [1.0, 0.0]) {
-            Some(motion) => Place { motion, is_found: true, ..place },
+            Some(motion) => Place { values: self.values(&motion), motion, is_found: true, ..place },
             None => Place { is_found: false, ..place },
         }
     }
@@ -169,16 +183,11 @@ impl Motions<'_> {
             Goal::Amplitude(_) => Some(self.arrived(n, place.clone())),
             Goal::Point(_) => {
                 let motion = self.motion(n, &place.motion, place.tangent, 0.0)?;
-                Some(Place { motion, ..place.clone() })
+                Some(Place { values: self.values(&motion), motion, ..place.clone() })
             }
         });
         moved.collect()
     }
-}
-
-/// Response, frequency and drive.
-fn values(motion: &PlantMotion) -> Vector3<f64> {
-    Vector3::new(motion.response.norm(), motion.omega, motion.amplitude)
 }
 
 /// Standard uncertainties of response, frequency and drive.
@@ -190,14 +199,12 @@ impl Place {
     /// The motion less a point, over its standard uncertainties.
     pub fn apart(&self, point: &MeasuredPoint) -> Vector3<f64> {
         let measured = Vector3::from([point.response, point.omega, point.drive].map(|one| one.value));
-        (values(&self.motion) - measured).component_div(&uncertainties(point))
+        (self.values - measured).component_div(&uncertainties(point))
     }
 }
 
 /// The curve at the amplitudes of a record that it has, by rising amplitude.
 pub(crate) fn backbone(places: &[Place]) -> Backbone {
     let found = places.iter().filter(|place| place.is_found);
-    found
-        .map(|Place { motion, .. }| [motion.response.norm(), motion.amplitude, motion.omega])
-        .collect()
+    found.map(|place| [place.values[0], place.values[2], place.values[1]]).collect()
 }

@@ -13,6 +13,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use num_complex::Complex64;
 use vines_estimate::{Element, Path};
+use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 
 /// A particle in its cavity. Behind a host with harmonics the constants are effective ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +63,11 @@ impl Particle {
     pub fn fold(&self) -> f64 {
         let ratio = (1.0 - self.r) / (1.0 + self.r);
         self.b * ratio / ratio.hypot(FRAC_PI_2)
+    }
+
+    /// Amplitude at which the motion loses its symmetry, m.
+    pub fn symmetry_breaking(&self) -> f64 {
+        self.b * Manifold::new(self.r).c(B_SYMMETRY_BREAKING)
     }
 
     /// The steady motion at an amplitude, m, and its lag: minus the response to a slow growth of ln A, to the first order, over the slope.
@@ -169,7 +175,7 @@ impl Element for Particle {
     }
 
     fn is_smooth(&self, amplitude: f64) -> bool {
-        amplitude > BEYOND_FOLD * self.fold()
+        (BEYOND_FOLD * self.fold()..self.symmetry_breaking()).contains(&amplitude)
     }
 
     fn along(&self, path: &Path) -> Option<Vec<Vec<(f64, Complex64)>>> {

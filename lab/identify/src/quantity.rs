@@ -12,8 +12,8 @@ use vines_scene::linear::{MeasuredLinear, ParticleState};
 use crate::hypothesis::Hypothesis;
 
 /// Number of unknowns.
-pub(crate) const UNKNOWNS: usize = 7;
-/// The unknowns: the logarithm of omega0 (rad/s), zeta, r, the logarithms of b (m), epsilon and M (kg), and the strength of an effect.
+pub(crate) const UNKNOWNS: usize = 8;
+/// The unknowns: the logarithm of omega0 (rad/s), zeta, r, the logarithms of b (m), epsilon and M (kg), the friction, and the strength of another effect.
 pub(crate) type Unknowns = SVector<f64, UNKNOWNS>;
 
 /// Step of a difference, relative or, of zeta and r, absolute: the curves are exact to 1e-12, and smooth.
@@ -29,12 +29,13 @@ pub(crate) fn unknowns(plant: &Parameters) -> Unknowns {
         plant.mass_ratio().ln(),
         plant.primary_mass.ln(),
         0.0,
+        0.0,
     ])
 }
 
-/// The unknowns with one moved by a step; the strength of an effect by a share of itself.
+/// The unknowns with one moved by a step; the strengths by a share of themselves.
 pub(crate) fn moved(x: &Unknowns, i: usize, step: f64) -> (Unknowns, f64) {
-    let step = if i == 6 && x[6] != 0.0 { step * x[6].abs() } else { step };
+    let step = if i >= 6 && x[i] != 0.0 { step * x[i].abs() } else { step };
     let mut x = *x;
     x[i] += step;
     (x, step)
@@ -166,7 +167,7 @@ impl Known {
         matches!(self, Self::Value { quantity, .. } if quantity.needs_a_scale())
     }
 
-    /// Independent residuals over their standard uncertainties. `strength`: of a hypothesis, 0 of all but the one that is fitted.
+    /// Independent residuals over their standard uncertainties. `strength`: of an effect, 0 of all that the hypothesis has not.
     pub(crate) fn residuals(&self, x: &Unknowns, strength: impl Fn(Hypothesis) -> f64) -> Vec<f64> {
         match self {
             Self::Strength { hypothesis, estimate: Estimate { value, uncertainty } } => {

@@ -306,13 +306,15 @@ fn hypotheses(report: &FitReport) -> Table {
         let strength = one.strength.zip(one.u_strength).map(|(value, uncertainty)| {
             format!("{symbol} = {}", with_unit(&with_decimals(Estimate { value, uncertainty }), unit))
         });
+        let friction = one.friction.zip(one.u_friction);
+        let friction = friction.map(|(value, uncertainty)| format!("mu = {}", with_decimals(Estimate { value, uncertainty })));
         let value = |n: usize| one.parameters.get(n).map_or_else(String::new, |parameter| {
             with_decimals(Estimate { value: parameter.value, uncertainty: parameter.uncertainty })
         });
         let p = one.p_value.map_or_else(String::new, |p| if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") });
         cells![
             *hypothesis,
-            strength.unwrap_or_default(),
+            strength.into_iter().chain(friction).collect::<Vec<_>>().join(", "),
             value(0),
             value(1),
             value(2),

@@ -12,7 +12,7 @@ use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Quantity, Sam
 use vines_model::numerics::{Estimate, mean, range};
 use vines_model::{Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
-use vines_scene::linear::{LinearResponse, MeasuredLinear, ParticleState};
+use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, ParticleState};
 use vines_scene::scene::Scene;
 
 use super::decimals;
@@ -319,7 +319,9 @@ impl Recording {
         let stretches = Stretch::all(&found);
         let periods = found.time.iter().zip(&found.amplitude).zip(&found.used);
         let periods = periods.filter(|(_, used)| **used).map(|((time, amplitude), _)| [*time, *amplitude]).collect();
-        Ok((MeasuredCurve { origin: origin.clone(), curve: found.curve, periods }, stretches))
+        let curve = found.curve.resolved(POINT_RESOLUTION);
+        let curve = curve.ok_or_else(|| self.without_curve(&Unidentified::default()))?;
+        Ok((MeasuredCurve { origin: origin.clone(), curve, periods }, stretches))
     }
 
     /// Refuses channels of which the response has no oscillation near the natural frequency, and channels that are swapped, or of which one has the
