@@ -180,7 +180,9 @@ impl Motions<'_> {
     /// The motions on the lines of those of a neighbouring plant, without a move along the curve.
     pub fn beside(&self, places: &[Place]) -> Option<Vec<Place>> {
         let moved = places.iter().enumerate().map(|(n, place)| match self.goals[n] {
-            Goal::Amplitude(_) => Some(self.arrived(n, place.clone())),
+            // What is not found here has no derivative.
+            Goal::Amplitude(_) if !place.is_found => Some(place.clone()),
+            Goal::Amplitude(_) => Some(self.arrived(n, place.clone())).filter(|place| place.is_found),
             Goal::Point(_) => {
                 let motion = self.motion(n, &place.motion, place.tangent, 0.0)?;
                 Some(Place { values: self.values(&motion), motion, ..place.clone() })
