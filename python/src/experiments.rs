@@ -13,9 +13,7 @@ use vines_bench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment,
-    fit::{
-        Candidate, EffectReport, Explanation, Found, Known, MeasuredPoint, Measurements, Recording, Selection, find,
-    },
+    fit::{Known, MeasuredPoint, Measurements, Recording, Selection, find},
     identification,
     linear::MeasuredLinear,
     rig::{BuiltIn, Simulated, Stoppable},
@@ -88,7 +86,7 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
 }
 
 /// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty, and the phase target (degrees; NaN: the scene's);
-/// `linear`: linear responses as JSON.
+/// `linear`: linear responses as JSON; `calibration`: standard uncertainty of the gain of the reference, relative.
 #[pyfunction]
 pub fn fit(
     py: Python<'_>,
@@ -97,7 +95,13 @@ pub fn fit(
     recordings: Vec<RecordingTuple>,
     known: Vec<String>,
     linear: Vec<String>,
+    calibration: f64,
 ) -> PyResult<String> {
+    if !(calibration > 0.0 && calibration.is_finite()) {
+        return Err(invalid(format!(
+            "calibration = {calibration} (relative): a number above 0 is allowed"
+        )));
+    }
     let estimate = |value, uncertainty| Estimate { value, uncertainty };
     let point = |[response, u_response, omega, u_omega, drive, u_drive, phase]: [f64; 7]| {
         let phase = if phase.is_nan() {
@@ -123,6 +127,7 @@ pub fn fit(
         recordings: recordings.into_iter().map(recording_of).collect::<PyResult<_>>()?,
         known: known.collect::<PyResult<_>>()?,
         linear: linear.collect::<PyResult<_>>()?,
+        calibration,
     };
     let (checked, scene) = (scene.scene.clone(), &scene.scene);
     let found = calculate(py, move || {
@@ -130,46 +135,11 @@ pub fn fit(
         find(&measured, &checked, |_| {})
     })?;
     let found = found.map_err(invalid)?;
-    let numbers = |point: MeasuredPoint| {
-        let MeasuredPoint { response, omega, drive, phase } = point;
-        let omega = omega.scaled(1.0 / std::f64::consts::TAU);
-        json!({
-            "f_Hz": omega.value, "A_m": response.value, "E_m": drive.value,
-            "u_f_Hz": omega.uncertainty, "u_A_m": response.uncertainty, "u_E_m": drive.uncertainty,
-            "phase_target_deg": scene.definition().at_phase(phase).phase_in_degrees(),
-        })
-    };
-    let Found {
-        fit,
-        plant,
-        parts,
-        linear,
-        record,
-        points_instead,
-        explanation,
-        alternatives,
-        ..
-    } = found;
-    let parts: Vec<_> = parts
-        .iter()
-        .map(|part| json!({"part": part, "point": part.point.map(numbers)}))
-        .collect();
-    let names = |one: &Explanation| {
-        one.possible()
-            .map(|one| one.effect.names()[0])
-            .collect::<Vec<_>>()
-            .join(" or ")
-    };
-    let reports = |candidates: &[Candidate]| candidates.iter().map(Candidate::report).collect::<Vec<EffectReport>>();
+    let plant = found.plant(&scene.plant);
     json(&json!({
-        "report": fit.report(&scene.plant),
-        "explained_by": explanation.as_ref().map(names).filter(|names| !names.is_empty()),
-        "effects": explanation.map(|one| reports(&one.candidates)),
-        "alternatives": reports(&alternatives),
-        "linear": linear,
-        "followed_periods": record.map(|one| one.periods),
-        "points_instead": points_instead,
-        "parts": parts,
+        "report": found.report(&scene.plant),
+        "linear": found.linear,
+        "stretches": found.stretches,
         "plant": {
             "M": plant.primary_mass, "k": plant.stiffness, "c": plant.damping,
             "m": plant.particle_mass, "b": plant.half_width, "r": plant.restitution,

@@ -153,6 +153,7 @@ def fit(
     recordings: list[tuple[Any, ...]],
     known: list[str],
     linear: list[str],
+    calibration: float,
 ) -> str: ...
 def linear_decay(scene: Scene, recording: tuple[Any, ...]) -> tuple[list[float], str] | None: ...
 def recording(

@@ -26,71 +26,63 @@ _MOTIONS = {
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit(Result):
-    """A rig fitted to points of its backbone.
+    """Every hypothesis about a rig, fitted to the same data, and the range of each parameter over the possible ones.
 
     Attributes
     ----------
     parameters : dict of ndarray
         symbol, unit, value, uncertainty and expected: f0, zeta, r, b and epsilon, and M, m, k and c if one of these is
-        known.
+        known. Value and uncertainty are the middle and half the width of the range over the hypotheses that are not
+        excluded.
+    hypotheses : dict of ndarray
+        One row a hypothesis: hypothesis, its strength with symbol, unit and u_strength, the coefficient of the friction
+        beside it and u_friction, its parameters f0, u_f0, zeta, u_zeta and so on, chi_square, degrees, p_value, and
+        excluded, the reason or None. A number that a hypothesis does not have is NaN.
+    channels : dict of ndarray
+        One row a hypothesis and channel (responses, frequencies and drives of points, or a recording): hypothesis,
+        channel, chi_square, the value expected if the uncertainties are right, and p_value.
     describes : bool
-        Whether the exact symmetric 1:1 motion describes the points: otherwise neither values nor uncertainties hold.
+        Whether a cavity is possible, and a nonlinear spring without a particle is not.
+    best : str
+        The hypothesis of `plant`, `chi_square`, `p_value`, `degrees`, `correlations` and `residuals`: the ideal cavity
+        if it is possible, otherwise the possible one with the smallest chi-square.
     chi_square, p_value : float
-        Chi-square, and the probability of a larger one.
+        Its chi-square, and the probability of a larger one.
     degrees : int
         Degrees of freedom of chi-square.
-    channels : dict of ndarray
-        Of response, frequency and drive: chi_square, the value expected if the uncertainties are right, and p_value.
     correlations : ndarray
         Of f0, zeta, r, b and epsilon, shape (5, 5).
     residuals : ndarray
         Of the points over their standard uncertainties, shape (points, 3): response, frequency, drive.
-    left_out : tuple of int
-        Indices of the points that contradict the others and are left out, from 0.
     plant : dict
         The section `plant` of a scene, for `Scene(plant=...)`.
     undetermined : tuple of str
-        Symbols of the first five parameters that the points do not determine: then `describes` says little.
-    explained_by : str or None
-        The effect of a real cavity that explains the points, where the ideal cavity does not describe them; several
-        that do are joined by " or ".
-    effects : dict of ndarray or None
-        Of each effect that was tried then: effect, symbol, unit, strength, uncertainty, chi_square, degrees, left_out,
-        describes, and possible_b_m, the half-width (m) that goes with it.
-    alternatives : dict of ndarray
-        The same columns: effects with which the points agree as well as with the ideal cavity, with another half-width.
+        Symbols of the first five parameters whose range, three times as wide, contains 0.
     linear : tuple of dict
-        Linear responses, with the state of the particle that agrees with the points, and the rises of chi-square with
+        Linear responses, with the state of the particle that agrees with the data, and the rises of chi-square with
         the particle carried along and free. A response whose state is `unknown` is left out.
-    followed_periods : int or None
-        Periods of recordings that the plant follows; None if the result is the fit of points.
-    points_instead : str or None
-        Why the points of recordings are fitted instead of the recordings themselves.
-    parts : tuple of dict
-        Parts of recordings: seconds, kind (held, sweep or decay), regime, and the point or None.
+    stretches : tuple of dict
+        Parts of recordings with one motion: seconds (begin and end), response_m (smallest and largest amplitude, m) and
+        motion: 1:1, free, carried or other.
     """
 
     parameters: Table
+    hypotheses: Table
+    channels: Table
     describes: bool
+    best: str
     chi_square: float
     p_value: float | None
     degrees: int
-    channels: Table
     correlations: NDArray[np.float64]
     residuals: NDArray[np.float64]
-    left_out: tuple[int, ...]
     plant: dict[str, float]
     undetermined: tuple[str, ...]
-    explained_by: str | None
-    effects: Table | None
-    alternatives: Table
     linear: tuple[dict[str, Any], ...]
-    followed_periods: int | None
-    points_instead: str | None
-    parts: tuple[dict[str, Any], ...]
+    stretches: tuple[dict[str, Any], ...]
 
     def __getitem__(self, symbol: str) -> tuple[float, float]:
-        """Return value and standard uncertainty of a parameter, such as `fit["r"]`."""
+        """Return the value of a parameter and its standard uncertainty over the possible hypotheses: `fit["r"]`."""
         index = list(self.parameters["symbol"]).index(symbol)
         return float(self.parameters["value"][index]), float(self.parameters["uncertainty"][index])
 
@@ -108,10 +100,11 @@ def fit(
     points: Mapping[str, Any] | Iterable[Mapping[str, Any]],
     scene: Scene | None = None,
     *,
-    known: Mapping[str, float | tuple[float, float]] | None = None,
+    known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None = None,
     linear: Iterable[Mapping[str, Any] | LinearDecay] = (),
+    calibration: float = 0.01,
 ) -> Fit:
-    """Fit natural frequency, damping ratio, restitution, half-width and mass ratio to points, as `vines fit` does.
+    """Fit every hypothesis about a rig to points of its backbone, as `vines fit` does.
 
     Parameters
     ----------
@@ -123,11 +116,15 @@ def fit(
     scene : Scene, optional
         Where the search begins; default: the default scene.
     known : mapping, optional
-        Values from elsewhere by their symbols f0 (Hz), zeta, r, b (m), epsilon, M, m (kg), k (N/m) and c (N s/m): a
-        number, which is kept, or a pair of value and standard uncertainty.
+        Values from elsewhere by their symbols f0 (Hz), zeta, r, b (m), epsilon, M, m (kg), k (N/m) and c (N s/m), and
+        strengths of hypotheses: mu (friction), theta (tilt, degrees), k_r (viscoelastic, (s/m)^(1/5)), v_y (plastic,
+        m/s), h (cubic stiffness) and g (gain of the reference). A number is exact, a pair is a value and its standard
+        uncertainty. A strength of 0 excludes its hypothesis: {"mu": 0}. Or texts such as "m=0.032±0.0003".
     linear : iterable, optional
         Linear responses beside those in columns of the points (tracked.csv): what `linear_decay` returns, or the
         mapping `linear` of tracked.json, of identification.json or of `vines check --json`.
+    calibration : float, optional
+        Standard uncertainty of the gain of the reference, relative.
 
     Returns
     -------
@@ -140,9 +137,10 @@ def fit(
 
     Examples
     --------
-    >>> found = fit(backbone(Scene(backbone={"points": 8})).points, Scene(plant={"r": 0.75, "b": 0.011}))
-    >>> found.describes, round(found["r"][0], 3), round(found["b"][0], 4)
-    (True, 0.65, 0.01)
+    >>> points = backbone(Scene(backbone={"points": 8})).points
+    >>> found = fit(points, Scene(plant={"r": 0.75, "b": 0.011}), known={"mu": 0, "b": (0.01, 5e-5)})
+    >>> found.describes, found.best, round(found["r"][0], 2), round(found["epsilon"][0], 4)
+    (True, 'ideal cavity', 0.65, 0.0084)
     """
     tables: list[Any] = [points] if isinstance(points, Mapping) or hasattr(points, "columns") else list(points)
     rows: list[list[float]] = []
@@ -170,7 +168,7 @@ def fit(
                 responses.append({name: float(first[name]) for name in _LINEAR[:5]} | {"particle": first["particle"]})
     for row in rows:
         row[2:4] = [math.tau * value for value in row[2:4]]
-    return _result(_native.fit(checked(scene)._native, rows, [], _texts(known), _responses(responses)))
+    return _fit(checked(scene), rows, [], known, responses, calibration)
 
 
 def fit_recordings(
@@ -178,16 +176,17 @@ def fit_recordings(
     scene: Scene | None = None,
     *,
     known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None = None,
+    calibration: float = 0.01,
 ) -> Fit:
-    """Fit a rig to recordings, as `vines fit record.csv` does.
+    """Fit every hypothesis about a rig to recordings, as `vines fit record.csv` does.
 
     Parameters
     ----------
     recordings : Recording or iterable of Recording
         What `read_recording` returns, or two channels of your own as a `Recording`.
     scene : Scene, optional
-        What the sensors read, about which natural frequency and damping the structure has, and where the search begins.
-    known : mapping, optional
+        What the sensors read, and about which rig was recorded: f0 within 1 %, b within 10 %, masses within 15 %.
+    known, calibration : optional
         As of `fit`.
 
     Returns
@@ -197,8 +196,8 @@ def fit_recordings(
     Raises
     ------
     ValueError
-        Nothing but linear decays (see `linear_decay`), a recording without a stretch near phase resonance,
-        a channel that is clipped or swapped, or too few points.
+        Nothing but linear decays (see `linear_decay`), a recording with fewer than thirty periods of symmetric 1:1
+        motion, or a channel that is clipped or swapped.
     """
     every = [recordings] if isinstance(recordings, Recording) else list(recordings)
     given = checked(scene)
@@ -207,8 +206,8 @@ def fit_recordings(
     linear = [decay for decay in decays if decay is not None]
     if linear and not kept:
         origin = every[0].origin
-        raise ValueError(f"{origin}: {linear[0]}; `linear_decay` returns these, and there are no points to fit")
-    return _result(_native.fit(given._native, [], kept, _texts(known), _responses(linear)))
+        raise ValueError(f"{origin}: {linear[0]}; `linear_decay` returns these, and there is nothing else to fit")
+    return _fit(given, [], kept, known, linear, calibration)
 
 
 def _truths(name: str, values: Any) -> NDArray[np.bool_]:
@@ -221,8 +220,8 @@ def _truths(name: str, values: Any) -> NDArray[np.bool_]:
     return np.array(found, dtype=np.bool_)
 
 
-#: Units of values from elsewhere.
-_KNOWN_UNITS = {"f0": "Hz", "b": "m", "M": "kg", "m": "kg", "k": "N/m", "c": "N s/m"}
+#: Units of values from elsewhere, and of strengths of hypotheses.
+_KNOWN_UNITS = {"f0": "Hz", "b": "m", "M": "kg", "m": "kg", "k": "N/m", "c": "N s/m", "theta": "deg", "v_y": "m/s"}
 
 
 def _responses(linear: Iterable[Mapping[str, Any] | LinearDecay]) -> list[str]:
@@ -244,23 +243,50 @@ def _texts(known: Mapping[str, float | tuple[float, float]] | Iterable[str] | No
     return [f"{name}={value}±{uncertainty}" for name, (value, uncertainty) in numbers.items()]
 
 
-def _result(text: str) -> Fit:
-    found = json.loads(text)
+def _fit(
+    scene: Scene,
+    points: list[list[float]],
+    recordings: list[tuple[Any, ...]],
+    known: Mapping[str, float | tuple[float, float]] | Iterable[str] | None,
+    linear: Iterable[Mapping[str, Any] | LinearDecay],
+    calibration: float,
+) -> Fit:
+    share = real(calibration, "1", "calibration")
+    found = json.loads(_native.fit(scene._native, points, recordings, _texts(known), _responses(linear), share))
     report = found["report"]
+    rows = report["hypotheses"]
+    of_channels = [{"hypothesis": row["hypothesis"]} | channel for row in rows for channel in row["channels"]]
     return Fit(
         parameters=_table(report["parameters"]),
-        channels=_table(report["channels"]),
+        hypotheses=_hypotheses(rows),
+        channels=_table(of_channels),
         correlations=np.array(report["correlations"]),
         residuals=np.array(report["residuals"]).reshape(-1, 3),
-        left_out=tuple(number - 1 for number in report["left_out"]),
         plant=found["plant"],
         undetermined=tuple(report["undetermined"]),
-        explained_by=found["explained_by"],
-        effects=None if found["effects"] is None else _table(found["effects"]),
-        alternatives=_table(found["alternatives"]),
         linear=tuple(found["linear"]),
-        followed_periods=found["followed_periods"],
-        points_instead=found["points_instead"],
-        parts=tuple(part["part"] | {"point": part["point"]} for part in found["parts"]),
-        **{key: report[key] for key in ("describes", "chi_square", "p_value", "degrees")},
+        stretches=tuple(found["stretches"]),
+        **{key: report[key] for key in ("describes", "best", "chi_square", "p_value", "degrees")},
     )
+
+
+def _hypotheses(rows: list[dict[str, Any]]) -> Table:
+    """Return one row a hypothesis, with a column for each parameter and its standard uncertainty."""
+    symbols = dict.fromkeys(one["symbol"] for row in rows for one in row["parameters"])
+
+    def flat(row: dict[str, Any]) -> dict[str, Any]:
+        values = {one["symbol"]: one for one in row["parameters"]}
+        columns: dict[str, Any] = {}
+        for symbol in symbols:
+            one = values.get(symbol, {})
+            columns |= {symbol: one.get("value"), f"u_{symbol}": one.get("uncertainty")}
+        before = ("hypothesis", "symbol", "unit", "strength", "u_strength", "friction", "u_friction")
+        return (
+            {name: row[name] for name in before}
+            | columns
+            | {name: row[name] for name in ("chi_square", "degrees", "p_value")}
+        )
+
+    table = _table([flat(row) for row in rows])
+    table["excluded"] = np.array([row["excluded"] for row in rows], dtype=object)
+    return table
