@@ -96,10 +96,18 @@ def test_fit_reads_recordings_and_says_what_is_wrong_with_one(call, tmp_path):
     assert call("backbone", *options, "--record", "run.csv").returncode == 0
     found = printed(call, "fit", "run.csv", "--set", "plant.r=0.7", "--set", "plant.b=0.0105", "--json")
     assert found["describes"]
-    assert sum(part["kind"] == "held" for part in found["parts"]) >= 6
+    assert found["best"] == "ideal cavity"
+    ideal, spring = found["hypotheses"][0], found["hypotheses"][-1]
+    assert ideal["excluded"] is None
+    assert spring["excluded"]
+    (seconds,) = (one["seconds"] for one in found["stretches"] if one["motion"] == "1:1")
+    assert seconds[1] - seconds[0] > 20.0
     for symbol, truth in (("r", 0.65), ("b", 0.01), ("epsilon", 0.032 / 3.807)):
-        one = next(one for one in found["parameters"] if one["symbol"] == symbol)
-        assert abs(one["value"] - truth) < 4 * one["uncertainty"] < 0.5 * truth
+        whole, narrow = (
+            next(one for one in given["parameters"] if one["symbol"] == symbol) for given in (found, ideal)
+        )
+        assert abs(whole["value"] - truth) < 2 * whole["uncertainty"]
+        assert abs(narrow["value"] - truth) < 4 * narrow["uncertainty"] < 0.1 * truth
     lines = (tmp_path / "run.csv").read_text().splitlines(keepends=True)
     (tmp_path / "gap.csv").write_text("".join(lines[:3000] + lines[3100:]))
     (tmp_path / "record.mat").touch()
