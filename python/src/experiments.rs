@@ -102,6 +102,13 @@ pub fn fit(
             "calibration = {calibration} (relative): a number above 0 is allowed"
         )));
     }
+    let structure = scene.scene.structure.as_ref();
+    let modes = structure.map_or(1, |structure| structure.modes.len());
+    if modes > 1 && !recordings.is_empty() {
+        return Err(invalid(format!(
+            "a recording is fitted for one oscillator, and the structure has {modes} modes: give the points of a backbone"
+        )));
+    }
     let estimate = |value, uncertainty| Estimate { value, uncertainty };
     let point = |[response, u_response, omega, u_omega, drive, u_drive, phase]: [f64; 7]| {
         let phase = if phase.is_nan() {

@@ -265,3 +265,12 @@ def test_accelerations_of_another_simulator_in_12_bits_with_hum_offset_and_drift
     # What no accelerometer reads is refused with the key to set.
     with pytest.raises(ValueError, match=r'resonance\.sensor = "q1"'):
         vines.fit_recordings(read)
+
+
+def test_a_recording_of_a_structure_with_several_modes_is_refused():
+    scene = vines.Scene(Path(__file__).parents[2] / "scenes" / "cantilever.toml")
+    time = 1e-3 * np.arange(10_000)
+    turn = 2 * np.pi * 8.8 * time
+    recording = vines.Recording("rig", ("y", "x"), 1e-3, 1e-3 * np.sin(turn), 1e-5 * np.cos(turn))
+    with pytest.raises(ValueError, match="one oscillator, and the structure has 3 modes"):
+        vines.fit_recordings(recording, scene)
