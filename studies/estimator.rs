@@ -23,7 +23,7 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use vines_estimate::CubicSpline;
-use vines_identify::{IdealRig, Identified, Samples, identify};
+use vines_identify::{IdealRig, Identified, Samples, Signals, identify};
 use vines_model::Sensor;
 
 /// Samples of a period.
@@ -240,13 +240,9 @@ struct Judged {
 }
 
 fn judged(rig: &Rig, recorded: &Recorded) -> Option<Judged> {
-    let samples = Samples {
-        response: &recorded.response,
-        base: &recorded.base,
-        sample_time: recorded.sample_time,
-        sensor: Sensor::Q1,
-    };
-    let found = identify(&samples, &rig.scene)?;
+    let signals = Signals::of_displacements([&recorded.response, &recorded.base], recorded.sample_time);
+    let samples = Samples { signals, sensor: Sensor::Q1 };
+    let found = identify(&samples, &rig.scene).ok()?;
     let (curve, [u_drive, u_sigma]) = of_curve(&rig.truth, &found)?;
     let (values, truth) = (found.scene.values(), rig.truth.values());
     let parameters = std::array::from_fn(|i| (values[i] - truth[i]) / found.uncertainty[i]);

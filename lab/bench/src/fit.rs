@@ -147,16 +147,18 @@ fn linear_verdicts(
     let verdict = |linear: &MeasuredLinear| {
         let is_possible = |particle| [particle, ParticleState::Unknown].contains(&linear.particle);
         let states = [ParticleState::Carried, ParticleState::Free];
-        let known = states.map(|particle| {
-            is_possible(particle).then_some(Known::Linear(MeasuredLinear { particle, ..*linear }))
-        });
+        let known = states
+            .map(|particle| is_possible(particle).then_some(Known::Linear(MeasuredLinear { particle, ..*linear })));
         let found = data.rises(&ideal, known);
         let particle = match found.agrees() {
             [true, false] => ParticleState::Carried,
             [false, true] => ParticleState::Free,
             _ => ParticleState::Unknown,
         };
-        LinearVerdict { linear: MeasuredLinear { particle, ..*linear }, rises: found.rises }
+        LinearVerdict {
+            linear: MeasuredLinear { particle, ..*linear },
+            rises: found.rises,
+        }
     };
     Ok(linear.iter().map(verdict).collect())
 }

@@ -1,20 +1,20 @@
-//! Guards the fit of a rig's parameters to points of its backbone: exact points, noise, points that do not belong, and what is refused.
+//! Guards the fit of a rig's parameters to points of its backbone and to recordings: every hypothesis, noise, what is rejected, and what is refused.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use lovines::Cavity;
-use lovines::cavity::GRAVITY;
+use lovines::{Cavity, Restitution};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vines_bench::backbone::track;
 use vines_bench::experiment::run;
 use vines_bench::fit::{
-    Channel, Contents, Effect, Fit, FitError, Kind, Known, MeasuredPoint, Measurements, Quantity, RecordFit, Recording,
-    Selection, contradiction, explain, find, fit, follow, linear_verdicts, parts, plain_table,
+    Channel, Contents, FitError, Found, Hypothesis, Known, MeasuredPoint, Measurements, Quantity, Recording, Selection,
+    contradiction, find, plain_table,
 };
 use vines_bench::linear::{MeasuredLinear, ParticleState};
 use vines_bench::rig::{BuiltIn, Chain, Rig, RigError, RigStage, Sensors, Simulated};
 use vines_bench::scene::{Definition, Dimensionless, Measurand, Parameters, Scene, Sensor};
+use vines_identify::{Data, Fit};
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{backbone_at_speed, resonant_motion};
 
@@ -70,15 +70,48 @@ fn points(uncertainty: f64, seed: u64) -> Vec<MeasuredPoint> {
     measured(motions, uncertainty, seed)
 }
 
-/// The fit of a client that believes in the default scene.
+/// The fit of an ideal cavity, of a client that believes in the default scene.
 fn fitted(points: &[MeasuredPoint], known: &[&str]) -> Result<Fit, FitError> {
-    let known: Vec<Known> = known.iter().map(|one| one.parse().unwrap()).collect();
-    fit(
-        points,
-        Definition::default(),
-        &Scene::load(None, &[]).unwrap().plant,
-        &known,
+    let known = known.iter().map(|one| one.parse().unwrap()).collect();
+    let data = Data { points: points.to_vec(), known, ..Data::default() };
+    data.ideal(&Scene::load(None, &[]).unwrap().plant)
+}
+
+/// All hypotheses, of a client whose scene is [`wrong_scene`].
+fn found(points: Vec<MeasuredPoint>, known: &[&str]) -> Found {
+    let known = known.iter().map(|one| one.parse().unwrap()).collect();
+    find(
+        &Measurements { points, known, ..Measurements::default() },
+        &wrong_scene(),
+        |_| {},
     )
+    .unwrap()
+}
+
+/// All hypotheses of a recording.
+fn of_recording(recording: Recording, scene: &Scene, known: &[&str]) -> Found {
+    let known = known.iter().map(|one| one.parse().unwrap()).collect();
+    let measured = Measurements {
+        recordings: vec![recording],
+        known,
+        ..Measurements::default()
+    };
+    find(&measured, scene, |_| {}).unwrap()
+}
+
+fn row(found: &Found, hypothesis: Hypothesis) -> &Fit {
+    let mut fits = found.hypotheses.fits.iter();
+    fits.find(|fit| fit.hypothesis == hypothesis)
+        .unwrap_or_else(|| panic!("{hypothesis:?}"))
+}
+
+/// Largest distance of the rig from the ranges of the parameters, over half their widths.
+fn outside(found: &Found) -> f64 {
+    let off = |quantity: &Quantity| {
+        let range = found.hypotheses.range(*quantity).unwrap();
+        (range.value - quantity.of_plant(&RIG)).abs() / range.uncertainty
+    };
+    FITTED.iter().map(off).fold(0.0, f64::max)
 }
 
 /// Largest error of the five parameters over their standard uncertainties.
@@ -96,11 +129,10 @@ fn pull(fit: &Fit, quantity: Quantity) -> f64 {
 #[test]
 fn exact_points_give_the_parameters_of_another_rig_than_the_expected_one() {
     let fit = fitted(&points(1e-4, 0), &[]).unwrap();
-    assert!(worst(&fit) < 1e-3, "{fit:?}");
-    assert!(fit.chi_square < 1e-6 && fit.left_out.is_empty() && !fit.is_rejected());
+    assert!(worst(&fit) < 3e-3 && fit.chi_square < 1e-4, "{} {fit:?}", worst(&fit));
     // What points do not separate is said; these do.
-    assert!(fit.undetermined().is_empty());
-    let near = fitted(&points(2e-2, 0)[..3], &[]).unwrap();
+    assert!(found(points(1e-4, 0), &["mu=0"]).hypotheses.undetermined().is_empty());
+    let near = found(points(2e-2, 0)[..3].to_vec(), &["mu=0"]).hypotheses;
     assert!(near.undetermined().contains(&Quantity::R), "{near:?}");
 }
 
@@ -111,27 +143,131 @@ fn through_noise_the_stated_intervals_hold_the_parameters_and_chi_square_its_deg
         let fit = fitted(&points(2e-3, seed), &[]).unwrap();
         within += FITTED.iter().filter(|one| pull(&fit, **one).abs() <= 1.96).count();
         chi_square += fit.chi_square / fit.degrees as f64 / 60.0;
+        let expected: f64 = fit.channels.iter().map(|one| one.expected).sum();
+        assert!(
+            (expected - fit.degrees as f64).abs() < 1e-3,
+            "{expected} {}",
+            fit.degrees
+        );
     }
     println!("{within} of 300 within 1.96 u, chi-square {chi_square:.2} per degree of freedom");
     assert!((270..=297).contains(&within) && (0.85..1.15).contains(&chi_square));
 }
 
+/// A cavity, the cubic stiffness, the gain of the reference, and the hypothesis they are, with its strength.
+fn effects() -> [(Cavity, f64, f64, Hypothesis, f64); 6] {
+    let law = |law| Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL };
+    [
+        (
+            Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL },
+            0.0,
+            0.0,
+            Hypothesis::Friction,
+            0.03,
+        ),
+        (
+            Cavity { tilt: 0.1, ..Cavity::IDEAL },
+            0.0,
+            0.0,
+            Hypothesis::Tilt,
+            5.729578,
+        ),
+        (
+            law(Restitution::Viscoelastic(0.5)),
+            0.0,
+            0.0,
+            Hypothesis::Viscoelastic,
+            0.5,
+        ),
+        (law(Restitution::Plastic(0.05)), 0.0, 0.0, Hypothesis::Plastic, 0.05),
+        (Cavity::IDEAL, 1e-3, 0.0, Hypothesis::Cubic, 1e-3),
+        (Cavity::IDEAL, 0.0, 0.02, Hypothesis::Reference, 0.02),
+    ]
+}
+
 #[test]
-fn points_of_another_motion_are_left_out_and_named_and_points_that_no_parameters_describe_rejected() {
-    let mut strange = points(2e-3, 5);
-    strange[3].omega.value *= 1.003;
-    strange[11].drive.value *= 1.2;
-    let fit = fitted(&strange, &[]).unwrap();
-    assert!(fit.left_out == [3, 11] && worst(&fit) < 4.0, "{fit:?}");
-    let mut bent = points(1e-3, 6);
-    let (first, last) = (bent[0].response.value, bent[11].response.value);
-    for point in &mut bent {
-        // A structure whose frequency depends on the amplitude by itself, and a loss that grows with it.
-        let share = (point.response.value - first) / (last - first);
-        point.drive.value *= 1.0 + 0.1 * (6.0 * share).sin();
+fn the_true_hypothesis_is_possible_with_its_strength_and_the_ranges_hold_the_rig() {
+    for (n, (cavity, h, g, hypothesis, strength)) in effects().into_iter().enumerate() {
+        // The periodic motions of the rig, with the uncertainties of 60 dB. Harmonic balance: a cubic stiffness moves their frequency.
+        let motions = (0..10).map(|n| {
+            let c = 0.36 + 0.03 * f64::from(n);
+            let [response, omega, drive] = motion_at(cavity, c * RIG.half_width);
+            [response, omega * (1.0 + 0.75 * h * c * c).sqrt(), drive * (1.0 + g)]
+        });
+        let points = measured(motions, 1e-4, 11 + n as u64);
+        let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"];
+        let with = found(points.clone(), &known);
+        let fit = row(&with, hypothesis);
+        let Estimate { value, uncertainty } = fit.strength().unwrap();
+        let is_its = fit.excluded.is_none() && (value - strength).abs() < 3.0 * uncertainty;
+        assert!(is_its, "{hypothesis:?}: {value} ± {uncertainty}, {:?}", fit.excluded);
+        let is_ideal = row(&with, Hypothesis::Ideal).excluded.is_none();
+        assert!(!is_ideal, "{hypothesis:?}");
+        assert!(row(&with, Hypothesis::Spring).excluded.is_some() && with.hypotheses.describes());
+        // r of a law of restitution is that at the speed of its impacts.
+        if !matches!(hypothesis, Hypothesis::Viscoelastic | Hypothesis::Plastic) {
+            for found in [with, found(points, &[])] {
+                for fit in &found.hypotheses.fits {
+                    println!(
+                        "{:?} {} {} {:?} {:?} {:?} {}",
+                        fit.hypothesis,
+                        fit.chi_square,
+                        fit.degrees,
+                        fit.excluded,
+                        fit.estimate(Quantity::B),
+                        fit.strength(),
+                        if fit.hypothesis == Hypothesis::Spring {
+                            0.0
+                        } else {
+                            worst(fit)
+                        }
+                    );
+                }
+                assert!(outside(&found) < 2.5, "{hypothesis:?}: {}", outside(&found));
+            }
+        }
     }
-    let fit = fitted(&bent, &[]).unwrap();
-    assert!(fit.is_rejected() && fit.left_out.is_empty(), "{:?}", fit.p_value());
+}
+
+#[test]
+fn friction_is_excluded_by_what_is_known_and_the_range_is_then_that_of_the_ideal_cavity() {
+    let points = points(1e-3, 4);
+    let wide = found(points.clone(), &[]);
+    let narrow = found(points.clone(), &["mu=0", "theta=0", "k_r=0", "v_y=0", "h=0", "g=0"]);
+    let b = |found: &Found| found.hypotheses.range(Quantity::B).unwrap().uncertainty;
+    assert!(b(&wide) > 5.0 * b(&narrow), "{} {}", b(&wide), b(&narrow));
+    let ideal = fitted(&points, &[]).unwrap().estimate(Quantity::B).unwrap().uncertainty;
+    assert!((b(&narrow) / ideal - 1.0).abs() < 0.01, "{} {ideal}", b(&narrow));
+    let fits = &narrow.hypotheses.fits;
+    assert!(
+        fits.iter()
+            .all(|fit| matches!(fit.hypothesis, Hypothesis::Ideal | Hypothesis::Spring)),
+        "{fits:?}"
+    );
+}
+
+#[test]
+fn points_that_no_hypothesis_describes_are_rejected_and_nothing_weaker_is_asked() {
+    let mut points = points(2e-3, 3);
+    points[4].drive.value *= 1.05;
+    let found = found(points, &[]);
+    assert!(!found.hypotheses.describes() && found.hypotheses.possible().next().is_none());
+    assert!(found.worst().contains("the drive of point 5"), "{}", found.worst());
+}
+
+#[test]
+fn points_of_a_hardening_spring_without_a_particle_are_no_cavity() {
+    let motions = (0..12).map(|n| {
+        let a = 2e-3 + 4e-4 * f64::from(n);
+        [
+            a,
+            RIG.natural_frequency() * (1.0 + 0.375 * 0.01 * (a / RIG.half_width).powi(2)),
+            2.0 * 0.006 * a,
+        ]
+    });
+    let found = found(measured(motions, 1e-3, 6), &[]);
+    let spring = row(&found, Hypothesis::Spring);
+    assert!(spring.excluded.is_none() && !found.hypotheses.describes(), "{found:?}");
 }
 
 /// Frequency, Hz, response, m, and drive, m, with their standard uncertainties, of a rig with epsilon = 0.003406 and r = 0.4643: chi-square has a
@@ -177,7 +313,9 @@ fn a_local_minimum_does_not_reject_the_right_model() {
         restitution: 0.302077,
         cavity: Cavity::IDEAL,
     };
-    let fit = fit(&points, Definition::default(), &expected, &[]).unwrap();
+    let fit = Data { points: points.to_vec(), ..Data::default() }
+        .ideal(&expected)
+        .unwrap();
     let r = fit.estimate(Quantity::R).unwrap();
     assert!(
         fit.chi_square < 5.0 && (r.value - 0.4643).abs() < 0.2 * r.uncertainty,
@@ -196,37 +334,11 @@ fn the_restitution_that_the_scene_states_does_not_matter() {
     let points = measured(motions, 2e-3, 2);
     for restitution in [0.1, 0.3, 0.5, 0.7, 0.99] {
         let expected = Parameters { restitution, ..RIG };
-        let r = fit(&points, Definition::default(), &expected, &[]).map(|fit| fit.estimate(Quantity::R).unwrap());
+        let data = Data { points: points.clone(), ..Data::default() };
+        let r = data.ideal(&expected).map(|fit| fit.estimate(Quantity::R).unwrap());
         let is_right = |r: &Estimate| (r.value - 0.9).abs() < 3.0 * r.uncertainty && r.uncertainty < 0.05;
         assert!(r.as_ref().is_ok_and(is_right), "{restitution}: {r:?}");
     }
-}
-
-#[test]
-fn the_largest_responses_are_left_out_where_they_belong_to_another_motion() {
-    let d = Dimensionless::of(&RIG, 0.0);
-    let motions = || {
-        (0..30).map(|n| {
-            let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.0135 * f64::from(n)).unwrap();
-            [c * d.b, d.omega0 * omega, d.amplitude(g)]
-        })
-    };
-    // Beyond the loss of symmetry frequency and drive leave the curve: too little to contradict any parameters.
-    let bent = motions().enumerate().map(|(n, [a, omega, e])| match n {
-        26.. => [a, omega * (1.0 - 1e-4), e * 1.006],
-        _ => [a, omega, e],
-    });
-    let points = measured(bent, 2e-3, 3);
-    let found = fitted(&points, &[]).unwrap();
-    assert!(found.left_out == [26, 27, 28, 29] && worst(&found) < 3.0, "{found:?}");
-    // A structure that hardens: no motion ends, and the misfit shows most at both ends.
-    for seed in 1..=12 {
-        let hard = motions().map(|[a, omega, e]| [a, omega * (1.0 + 1e-3 * (a / d.b).powi(2)), e]);
-        let hard = fitted(&measured(hard, 3e-3, seed), &[]).unwrap();
-        assert!(hard.is_rejected() && hard.left_out.is_empty(), "{seed}: {hard:?}");
-    }
-    let whole = fitted(&measured(motions(), 2e-3, 3), &[]).unwrap();
-    assert!(whole.left_out.is_empty() && worst(&whole) < 3.0, "{whole:?}");
 }
 
 #[test]
@@ -261,15 +373,30 @@ fn the_linear_response_is_data_for_the_state_of_the_particle_that_agrees_with_th
         particle: ParticleState::Unknown,
     };
     let judged = |linear| {
-        let expected = Scene::load(None, &[]).unwrap().plant;
-        linear_verdicts(&[linear], &points, Definition::default(), &expected, &[]).unwrap()[0].linear
+        let known = ["mu=0", "theta=0", "k_r=0", "v_y=0", "h=0", "g=0"]
+            .map(|one| one.parse().unwrap())
+            .to_vec();
+        let measured = Measurements {
+            points: points.clone(),
+            linear: vec![linear],
+            known,
+            ..Measurements::default()
+        };
+        find(&measured, &Scene::load(None, &[]).unwrap(), |_| {})
+            .unwrap()
+            .linear[0]
+            .linear
     };
     let u = |fit: &Fit| fit.estimate(Quantity::R).unwrap().uncertainty;
     for (added, state) in [(0.0, ParticleState::Free), (epsilon, ParticleState::Carried)] {
         let judged = judged(response(added, 1.0));
         assert_eq!(judged.particle, state);
-        let expected = Scene::load(None, &[]).unwrap().plant;
-        let fit = fit(&points, Definition::default(), &expected, &[Known::Linear(judged)]).unwrap();
+        let data = Data {
+            points: points.clone(),
+            known: vec![Known::Linear(judged)],
+            ..Data::default()
+        };
+        let fit = data.ideal(&Scene::load(None, &[]).unwrap().plant).unwrap();
         assert!(
             worst(&fit) < 3.0 && u(&fit) < 0.8 * u(&alone) && fit.degrees == alone.degrees + 2,
             "{fit:?}"
@@ -309,6 +436,48 @@ fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
     let parameters = found.parameters.expect("another restitution fits");
     let r = parameters.iter().find(|parameter| parameter.symbol == "r").unwrap();
     assert!((r.value - 0.55).abs() < 0.01 && r.expected == 0.65, "{r:?}");
+}
+
+/// Points of the rig at these phase targets, degrees, in turn.
+fn points_at(phases: &[f64], uncertainty: f64, seed: u64) -> Vec<MeasuredPoint> {
+    let at = |n: usize| phases[n % phases.len()].to_radians();
+    let motions = (0..12).map(|n| {
+        let definition = Definition::default().at_phase(at(n));
+        let d = Dimensionless { definition, ..Dimensionless::of(&RIG, 0.0) };
+        let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.03 * n as f64).unwrap();
+        [c * d.b, d.omega0 * omega, d.amplitude(g)]
+    });
+    let points = measured(motions, uncertainty, seed).into_iter().enumerate();
+    points
+        .map(|(n, point)| MeasuredPoint { phase: at(n), ..point })
+        .collect()
+}
+
+#[test]
+fn points_at_any_phase_target_give_the_parameters_and_taken_for_phase_resonance_they_do_not() {
+    for phases in [&[-80.0][..], &[-110.0], &[-60.0], &[-90.0, -80.0, -100.0]] {
+        for seed in [0, 5] {
+            let points = points_at(phases, 1e-3, seed);
+            let fit = fitted(&points, &[]).unwrap();
+            let most = if seed == 0 { 3e-3 } else { 3.0 };
+            assert!(
+                worst(&fit) < most && fit.p_value().unwrap() > 1e-3,
+                "{phases:?}: {}, {fit:?}",
+                worst(&fit)
+            );
+            assert!(
+                contradiction(&points, Definition::default(), &RIG).is_none(),
+                "{phases:?}"
+            );
+        }
+        // Read as points of phase resonance they have other parameters, or none.
+        let mut points = points_at(phases, 1e-3, 5);
+        points.iter_mut().for_each(|point| point.phase = -FRAC_PI_2);
+        assert!(
+            contradiction(&points, Definition::default(), &RIG).is_some(),
+            "{phases:?}"
+        );
+    }
 }
 
 /// A recording of a backbone at 60 dB that is tracked on [`RIG`], and cut in the middle of its first and its last level.
@@ -352,104 +521,6 @@ fn recorded_on(rig: Parameters, settings: &str) -> Recording {
     }
 }
 
-/// Points of the rig at these phase targets, degrees, in turn.
-fn points_at(phases: &[f64], uncertainty: f64, seed: u64) -> Vec<MeasuredPoint> {
-    let at = |n: usize| phases[n % phases.len()].to_radians();
-    let motions = (0..12).map(|n| {
-        let definition = Definition::default().at_phase(at(n));
-        let d = Dimensionless { definition, ..Dimensionless::of(&RIG, 0.0) };
-        let [omega, c, g] = backbone_at_speed(&d, 0.7 + 0.03 * n as f64).unwrap();
-        [c * d.b, d.omega0 * omega, d.amplitude(g)]
-    });
-    let points = measured(motions, uncertainty, seed).into_iter().enumerate();
-    points
-        .map(|(n, point)| MeasuredPoint { phase: at(n), ..point })
-        .collect()
-}
-
-#[test]
-fn points_at_any_phase_target_give_the_parameters_and_taken_for_phase_resonance_they_do_not() {
-    for phases in [&[-80.0][..], &[-110.0], &[-60.0], &[-90.0, -80.0, -100.0]] {
-        for seed in [0, 5] {
-            let points = points_at(phases, 1e-3, seed);
-            let fit = fitted(&points, &[]).unwrap();
-            let most = if seed == 0 { 1e-3 } else { 3.0 };
-            assert!(
-                worst(&fit) < most && !fit.is_rejected(),
-                "{phases:?}: {}, {fit:?}",
-                worst(&fit)
-            );
-            assert!(
-                contradiction(&points, Definition::default(), &RIG).is_none(),
-                "{phases:?}"
-            );
-        }
-        // Read as points of phase resonance they have other parameters, or none.
-        let mut points = points_at(phases, 1e-3, 5);
-        points.iter_mut().for_each(|point| point.phase = -FRAC_PI_2);
-        assert!(
-            contradiction(&points, Definition::default(), &RIG).is_some(),
-            "{phases:?}"
-        );
-    }
-}
-
-#[test]
-fn the_effect_that_explains_points_at_another_phase_target_is_found_at_this_phase() {
-    let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };
-    let (rig, phase) = (Parameters { cavity: friction, ..RIG }, -80_f64.to_radians());
-    let definition = Definition::default().at_phase(phase);
-    let motions = (0..10).map(|n| {
-        let motion = resonant_motion(&rig, definition, (0.36 + 0.03 * f64::from(n)) * RIG.half_width, None).unwrap();
-        [motion.response.norm(), motion.omega, motion.amplitude]
-    });
-    let points: Vec<MeasuredPoint> = measured(motions, 1e-4, 12)
-        .into_iter()
-        .map(|point| MeasuredPoint { phase, ..point })
-        .collect();
-    let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"].map(|one| one.parse().unwrap());
-    let found = explain(&points, Definition::default(), &wrong_scene().plant, &known, |_| {}).unwrap();
-    let best = found.explains().unwrap();
-    let off = (best.strength.value - 0.05) / best.strength.uncertainty;
-    assert!(
-        best.effect == Effect::Friction && off.abs() < 3.0,
-        "{:?}",
-        best.report()
-    );
-}
-
-#[test]
-fn a_recording_at_another_phase_target_gives_the_parameters_at_this_phase_and_is_else_refused_with_the_phase() {
-    let record = recorded(" chain.snr=60 controller.phase_target=-80");
-    let measurements = Measurements { recordings: vec![record], ..Measurements::default() };
-    let error = find(&measurements, &wrong_scene(), |_| {}).unwrap_err().to_string();
-    for part in [
-        "is -80.0 degrees (median)",
-        "asks for -90 degrees",
-        "controller.phase_target=-80.0",
-    ] {
-        assert!(error.contains(part), "{part}: {error}");
-    }
-    let stated = error.rsplit("controller.phase_target=").next().unwrap();
-    let stated: f64 = stated.trim().parse().unwrap();
-    assert!((stated + 80.0).abs() < 0.5, "{stated}");
-    let at_80 = scene("plant.r=0.75 plant.b=0.0105 plant.c=3.5 plant.k=11600 plant.M=3.9 controller.phase_target=-80");
-    let points: Vec<MeasuredPoint> = parts(&measurements.recordings, &at_80)
-        .unwrap()
-        .concat()
-        .iter()
-        .filter_map(|part| part.point)
-        .collect();
-    let found = fit(&points, at_80.definition(), &at_80.plant, &[]).unwrap();
-    assert!(
-        points.len() >= 4 && worst(&found) < 3.0 && !found.is_rejected(),
-        "{}, {found:?}",
-        worst(&found)
-    );
-    let found = find(&measurements, &at_80, |_| {}).unwrap();
-    assert!(worst(&found.fit) < 3.0, "{}", worst(&found.fit));
-}
-
 /// Keeps what is read before each step.
 struct Recorder {
     rig: Box<dyn Rig>,
@@ -467,150 +538,6 @@ impl RigStage for Recorder {
     }
 }
 
-#[test]
-fn a_recording_that_begins_and_ends_in_the_middle_of_a_level_gives_the_parameters() {
-    let scene = wrong_scene();
-    let parts = parts(&[recording()], &scene).unwrap().concat();
-    let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
-    let held = parts.iter().filter(|part| part.kind == Kind::Held).count();
-    assert!(held >= 4, "{parts:?}");
-    let fit = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
-    let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
-    let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
-    assert!(worst(&fit) < 3.0 && are_narrow && !fit.is_rejected(), "{fit:?}");
-}
-
-#[test]
-fn the_plant_follows_a_record_and_determines_the_parameters_better_than_its_points() {
-    let (scene, mut record) = (wrong_scene(), recording());
-    // A second in which the sensor reads another motion.
-    let from = record.response.len() / 2;
-    let odd = from..from + (1.0 / record.sample_time) as usize;
-    record.response[odd].iter_mut().for_each(|value| *value *= 1.02);
-    // Later, two seconds of uneven impacts: a second harmonic of 0.1 %.
-    let [second, turn] = [
-        1.0 / record.sample_time,
-        2.0 * RIG.natural_frequency() * record.sample_time,
-    ];
-    let uneven = from + (8.0 * second) as usize..from + (10.0 * second) as usize;
-    for n in uneven.clone() {
-        record.response[n] += 5e-6 * (turn * n as f64).sin();
-    }
-    let parts = parts(&[record.clone()], &scene).unwrap();
-    let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
-    let start = fit(&points, Definition::default(), &scene.plant, &[]).unwrap();
-    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
-    assert!(
-        worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
-        "{followed:?}"
-    );
-    assert!(
-        followed.colour.abs() < 0.15,
-        "innovations are white: {}",
-        followed.colour
-    );
-    let u = |fit: &Fit| fit.estimate(Quantity::R).unwrap().uncertainty;
-    assert!(u(&followed.fit) < 0.5 * u(&start), "{} {}", u(&followed.fit), u(&start));
-    for middle in [from as f64 + 0.5 * second, uneven.start as f64 + second] {
-        let middle = middle * record.sample_time;
-        let is_named = |[begin, end]: [f64; 2]| begin < middle && middle < end;
-        let mut left_out = followed.left_out.iter();
-        assert!(
-            left_out.any(|one| is_named(one.seconds)),
-            "{middle} s: {:?}",
-            followed.left_out
-        );
-    }
-}
-
-#[test]
-fn a_record_that_contradicts_the_plant_leaves_its_points_and_says_so() {
-    let scene = scene("chain.snr=60");
-    let found = |record: Recording| {
-        let recordings = vec![record];
-        let found = find(&Measurements { recordings, ..Measurements::default() }, &scene, |_| {}).unwrap();
-        assert!(found.record.is_none());
-        found.points_instead.unwrap()
-    };
-    // Tilt and friction: b would be 8 % off, 23 times its uncertainty.
-    let cavity = Cavity { tilt: 0.03, kinetic_friction: 0.02, ..Cavity::IDEAL };
-    let strange = recorded_on(Parameters { cavity, ..scene.plant }, " chain.snr=60");
-    assert_eq!(
-        found(strange),
-        "the plant does not follow the recordings: their points are fitted instead, and show less"
-    );
-    // An amplifier whose gain changes from period to period, by as much as the noise of a period.
-    let mut unsteady = recording();
-    for (n, period) in unsteady.response.chunks_mut(100).enumerate() {
-        let gain = 1.0 + 4e-4 * ((0.618 * n as f64).fract() - 0.5);
-        period.iter_mut().for_each(|value| *value *= gain);
-    }
-    let instead = found(unsteady);
-    let says = "the recordings, followed period by period, contradict the model (chi-square ";
-    assert!(instead.starts_with(says), "{instead}");
-}
-
-#[test]
-fn a_record_without_noise_is_followed_to_its_end() {
-    let (scene, record) = (wrong_scene(), recorded(""));
-    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
-    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
-    assert!(
-        worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
-        "{followed:?}"
-    );
-    let seconds = record.response.len() as f64 * record.sample_time;
-    let followed_for = followed.periods as f64 * std::f64::consts::TAU / RIG.natural_frequency();
-    let r = followed.fit.estimate(Quantity::R).unwrap();
-    assert!(
-        followed_for > 0.8 * seconds && r.uncertainty < 1e-4,
-        "{followed_for} s of {seconds} s, r = {r:?}"
-    );
-}
-
-#[test]
-fn a_record_is_followed_near_the_fold_where_only_its_filter_holds_the_particle() {
-    let scene = scene("chain.snr=60");
-    let Parameters { primary_mass, stiffness, .. } = RIG;
-    let rig = Parameters {
-        damping: 0.035 * (stiffness * primary_mass).sqrt(),
-        particle_mass: 0.0163 * primary_mass,
-        restitution: 0.75,
-        ..RIG
-    };
-    let record = recorded_on(rig, " chain.snr=60 backbone.C_to=0.1 backbone.points=14");
-    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
-    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-    let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
-    assert!(followed.left_out.is_empty(), "{:?}", followed.left_out);
-    for quantity in FITTED {
-        let Estimate { value, uncertainty } = followed.fit.estimate(*quantity).unwrap();
-        let error = (value - quantity.of_plant(&rig)) / uncertainty;
-        assert!(error.abs() < 3.0, "{quantity:?}: {error} u");
-    }
-}
-
-#[test]
-fn a_record_behind_an_anti_alias_filter_determines_the_parameters_as_well() {
-    let scene = wrong_scene();
-    let u = |filter: &str| {
-        let record = recorded(&format!(" chain.snr=60{filter}"));
-        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
-        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-        let followed = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
-        assert!(
-            worst(&followed.fit) < 3.0 && !followed.fit.is_rejected(),
-            "{filter}: {followed:?}"
-        );
-        followed.fit.estimate(Quantity::R).unwrap().uncertainty
-    };
-    // Noise is white, or is so only below the cut-off.
-    let [white, filtered] = ["", " chain.filter=10"].map(u);
-    assert!(filtered < 1.3 * white, "{filtered} {white}");
-}
-
 /// A recording of a lock and its decay, on [`RIG`] with this cavity.
 fn locked(scene: &Scene, cavity: Cavity) -> Recording {
     let rig = Simulated::new(Parameters { cavity, ..RIG }, scene.start).unwrap();
@@ -626,135 +553,162 @@ fn locked(scene: &Scene, cavity: Cavity) -> Recording {
     }
 }
 
+/// Response, m, frequency, rad/s, and drive, m, of the rig with a cavity at this amplitude of the response.
+fn motion_at(cavity: Cavity, amplitude: f64) -> [f64; 3] {
+    let rig = Parameters { cavity, ..RIG };
+    let motion = resonant_motion(&rig, Definition::default(), amplitude, None).unwrap();
+    [amplitude, motion.omega, motion.amplitude]
+}
+
+/// Largest error of the ideal cavity of a recording, which must be possible and narrow.
+fn of_ideal(found: &Found) -> f64 {
+    let fit = row(found, Hypothesis::Ideal);
+    let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
+    assert!(estimates.all(|one| one.uncertainty < 0.2 * one.value), "{fit:?}");
+    println!("{} {:?}", found.worst(), found.stretches);
+    for (p, a) in found.data.shown().iter().zip(found.data.apart(fit)) {
+        println!("{:.4e} {:.2} {:.2}", p.response.value, a[1], a[2]);
+    }
+    let rows = found.hypotheses.fits.iter().map(|fit| {
+        (
+            fit.hypothesis.names()[0],
+            fit.chi_square,
+            fit.degrees,
+            fit.excluded.clone(),
+        )
+    });
+    assert!(
+        fit.excluded.is_none() && found.hypotheses.describes(),
+        "{} {:?}",
+        worst(fit),
+        rows.collect::<Vec<_>>()
+    );
+    worst(fit)
+}
+
 #[test]
-fn the_plant_follows_a_lock_and_its_decay_whatever_the_natural_frequency_that_the_scene_states() {
-    let record = locked(&scene("chain.snr=60"), Cavity::IDEAL);
-    // With a stiffness that is 1 % too low, a particle that is carried along explains each point.
-    for k in [11600, 11385] {
-        let scene = scene(&format!(
-            "plant.r=0.75 plant.b=0.0105 plant.c=3.5 plant.M=3.9 plant.k={k}"
-        ));
-        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
-        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-        let found = follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[]).unwrap();
-        let r = found.fit.estimate(Quantity::R).unwrap();
-        assert!(
-            worst(&found.fit) < 3.0 && !found.fit.is_rejected() && r.uncertainty < 0.01,
-            "{r:?} {found:?}"
-        );
+fn a_recording_of_levels_at_any_phase_target_behind_a_filter_or_with_a_drift_gives_the_parameters() {
+    let scene = wrong_scene();
+    let mut drifting = recording();
+    let count = drifting.response.len() as f64;
+    for (n, value) in drifting.response.iter_mut().enumerate() {
+        *value += 0.02 * (n as f64 / count).powi(2);
+    }
+    for (name, one) in [
+        ("levels", recording()),
+        ("at -80 degrees", recorded(" chain.snr=60 controller.phase_target=-80")),
+        ("behind a filter", recorded(" chain.snr=60 chain.filter=10")),
+        ("with a drift", drifting),
+    ] {
+        let off = of_ideal(&of_recording(one, &scene, &["mu=0"]));
+        assert!(off < 3.0, "{name}: {off}");
     }
 }
 
-/// The fit of a record without impacts, of a rig with this friction and a scene with this stiffness, N/m.
-fn followed_without_impacts(kinetic_friction: f64, stiffness: u32) -> Option<RecordFit> {
-    let rests = scene("chain.snr=60 excitation.G=0.7 controller.samples_per_period=40").at_rest();
-    let record = locked(&rests, Cavity { kinetic_friction, ..Cavity::IDEAL });
-    let scene = scene(&format!("plant.M=3.9 plant.c=3.5 plant.k={stiffness}"));
-    let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
-    let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-    follow(&prepared, &parts, &[], Definition::default(), &scene.plant, &[])
-}
-
 #[test]
-fn a_record_without_impacts_is_not_followed_whatever_the_natural_frequency_that_the_scene_states() {
-    let found = followed_without_impacts(0.0, 11400);
-    assert!(found.is_none(), "{found:?}");
-}
-
-#[test]
-fn a_record_of_a_particle_that_slides_without_impacts_is_not_followed() {
-    let found = followed_without_impacts(0.02, 11500);
-    assert!(found.is_none(), "{found:?}");
-}
-
-#[test]
-fn without_knowns_an_ideal_fit_says_which_cavity_would_give_the_same_points() {
-    // From the fold on, where a motion with other parameters may not exist.
+fn a_recording_with_friction_is_told_by_a_ruler_and_without_one_the_range_holds_the_rig() {
     let rig = Parameters {
-        particle_mass: 0.0064 * RIG.primary_mass,
-        damping: 0.0064 * 0.98 * RIG.primary_mass * RIG.natural_frequency(),
-        restitution: 0.79,
-        cavity: Cavity { kinetic_friction: 0.09, ..Cavity::IDEAL },
+        cavity: Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL },
         ..RIG
     };
-    let motion = |c: f64| {
-        let motion = resonant_motion(&rig, Definition::default(), c * RIG.half_width, None).ok()?;
-        Some([c * RIG.half_width, motion.omega, motion.amplitude])
-    };
-    let motions = (0..29).filter_map(|n| motion(0.14 + 0.02 * f64::from(n)));
-    let points = measured(motions, 1e-3, 12);
-    let found = find(
-        &Measurements { points, ..Measurements::default() },
-        &wrong_scene(),
-        |_| {},
-    )
-    .unwrap();
-    let with_friction = found.alternatives.iter().find(|one| one.effect == Effect::Friction);
-    let with_friction = with_friction.unwrap_or_else(|| panic!("{:?}", found.explanation));
-    // The largest friction that the points allow, and with it the half-width: the rig is between this and the ideal cavity.
-    let (b, ideal) = (with_friction.report().possible_b_m, found.plant.half_width);
-    let reaches = with_friction.strength.value >= 0.09 && (0.98 * b..ideal).contains(&RIG.half_width);
-    assert!(reaches, "{:?}: {b} to {ideal}", with_friction.strength);
-    let friction = Cavity { kinetic_friction: 0.05, ..Cavity::IDEAL };
-    let motions = || (0..10).map(|n| motion_at(friction, (0.36 + 0.03 * f64::from(n)) * RIG.half_width));
-    let points = measured(motions(), 1e-4, 12);
-    let mut measured = Measurements { points, ..Measurements::default() };
-    let found = find(&measured, &wrong_scene(), |_| {}).unwrap();
-    assert!(!found.fit.is_rejected() && found.explanation.is_none(), "{found:?}");
-    let effects: Vec<Effect> = found.alternatives.iter().map(|one| one.effect).collect();
-    assert!(effects.contains(&Effect::Friction), "{effects:?}");
-    // No rig that is built with care has a stronger effect, whatever the points allow.
-    let strong = 0.05 * RIG.half_width * RIG.natural_frequency().powi(2);
-    for one in &found.alternatives {
-        let most = match one.effect {
-            Effect::Friction => 1.2 * strong / GRAVITY,
-            Effect::Tilt => 1.2 * (2.0 * strong / GRAVITY).to_degrees(),
-            Effect::Hardening => 1.2 * 0.05 * RIG.mass_ratio(),
-            Effect::Viscoelastic | Effect::Plastic => f64::INFINITY,
-        };
-        let b = one.report().possible_b_m / RIG.half_width;
-        assert!(
-            one.strength.value.abs() < most && (0.5..2.0).contains(&b),
-            "{:?}",
-            one.report()
+    let record = recorded_on(rig, " chain.snr=60");
+    let known = ["b=0.0095±0.00002", "epsilon=0.009231±0.00002"];
+    let with = of_recording(record.clone(), &wrong_scene(), &known);
+    assert!(row(&with, Hypothesis::Ideal).excluded.is_some(), "{with:?}");
+    let mu = row(&with, Hypothesis::Friction).strength().unwrap();
+    assert!(
+        (mu.value - 0.03).abs() < 3.0 * mu.uncertainty && mu.uncertainty < 0.006,
+        "{mu:?}"
+    );
+    assert!(outside(&with) < 3.0, "{}", outside(&with));
+    let without = of_recording(record, &wrong_scene(), &[]);
+    for fit in &without.hypotheses.fits {
+        println!(
+            "{:?} {} {} {:?} {:?}",
+            fit.hypothesis,
+            fit.chi_square,
+            fit.degrees,
+            fit.excluded,
+            fit.estimate(Quantity::B)
         );
     }
-    // So does one without a point that contradicts the others.
-    let mut strange = measured.clone();
-    strange.points[4].drive.value *= 1.01;
-    let found = find(&strange, &wrong_scene(), |_| {}).unwrap();
-    let effects = found.alternatives.iter().map(|one| one.effect);
     assert!(
-        found.fit.left_out == [4] && effects.collect::<Vec<_>>().contains(&Effect::Friction),
-        "{found:?}"
+        outside(&without) < 3.0 && without.hypotheses.describes(),
+        "{}",
+        outside(&without)
     );
-    // A tilt contradicts every ideal cavity, and is found without knowns as well.
-    let tilt = Cavity { tilt: 0.06, ..Cavity::IDEAL };
-    let motions = (0..9).map(|n| motion_at(tilt, (0.3 + 0.04 * f64::from(n)) * RIG.half_width));
-    let tilted = self::measured(motions, 2e-4, 12);
-    let tilted = explain(&tilted, Definition::default(), &wrong_scene().plant, &[], |_| {}).unwrap();
-    let possible: Vec<Effect> = tilted.possible().map(|one| one.effect).collect();
-    let fits = tilted
-        .candidates
-        .iter()
-        .map(|one| (one.effect, one.fit.chi_square, one.fit.left_out.len()));
-    assert!(
-        possible == [Effect::Tilt],
-        "{} {:?}",
-        tilted.ideal.chi_square,
-        fits.collect::<Vec<_>>()
-    );
-    // A ruler and a scale decide.
-    measured.known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"]
-        .map(|one| one.parse().unwrap())
-        .into();
-    let explanation = find(&measured, &wrong_scene(), |_| {}).unwrap().explanation.unwrap();
-    assert!(
-        explanation
-            .explains()
-            .is_some_and(|best| best.effect == Effect::Friction),
-        "{explanation:?}"
-    );
+}
+
+#[test]
+fn a_recording_that_contradicts_every_hypothesis_is_rejected_with_its_times() {
+    let mut record = recording();
+    // From the middle on the sensor reads 0.5 % too much.
+    let middle = record.response.len() / 2;
+    record.response[middle..].iter_mut().for_each(|value| *value *= 1.005);
+    let found = of_recording(record, &wrong_scene(), &[]);
+    assert!(!found.hypotheses.describes(), "{found:?}");
+    assert!(found.worst().contains("record.csv between "), "{}", found.worst());
+}
+
+#[test]
+fn a_lock_and_its_decay_give_the_parameters_whatever_the_natural_frequency_that_the_scene_states() {
+    let record = locked(&scene("chain.snr=60"), Cavity::IDEAL);
+    for k in [11600, 11385] {
+        let scene = scene(&format!(
+            "plant.r=0.6 plant.b=0.0101 plant.c=3.5 plant.M=3.9 plant.k={k}"
+        ));
+        let off = of_ideal(&of_recording(record.clone(), &scene, &["mu=0"]));
+        assert!(off < 3.0, "{k}: {off}");
+    }
+}
+
+#[test]
+fn a_recording_without_impacts_has_no_curve_also_where_the_particle_slides() {
+    for (kinetic_friction, stiffness) in [(0.0, 11400), (0.02, 11500)] {
+        let rests = scene("chain.snr=60 excitation.G=0.7 controller.samples_per_period=40").at_rest();
+        let record = locked(&rests, Cavity { kinetic_friction, ..Cavity::IDEAL });
+        let scene = scene(&format!("plant.M=3.9 plant.c=3.5 plant.k={stiffness}"));
+        let measured = Measurements { recordings: vec![record], ..Measurements::default() };
+        let error = find(&measured, &scene, |_| {})
+            .map(|found| found.hypotheses)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("fewer than thirty periods"), "{error}");
+    }
+}
+
+#[test]
+fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
+    let scene = Scene {
+        resonance: Definition { sensor: Sensor::Q1, ..Definition::default() },
+        ..wrong_scene()
+    };
+    let u = [(0, 0), (2, 2), (1, 0), (0, 1)].map(|(of_response, of_base)| {
+        let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
+        let found = of_recording(recorded_as(measurands), &scene, &["mu=0"]);
+        let off = of_ideal(&found);
+        let u = row(&found, Hypothesis::Ideal)
+            .estimate(Quantity::R)
+            .unwrap()
+            .uncertainty;
+        println!("{measurands:?}: worst {off:.2} u, u(r) {u:.1e}");
+        assert!(off < 3.0, "{measurands:?}: {off}");
+        u
+    });
+    assert!(u.iter().all(|one| *one < 2.0 * u[0]), "{u:?}");
+    // The scene's sensor reads v, and no accelerometer does.
+    let accelerometer = recorded_as([Measurand::Acceleration, Measurand::Displacement]);
+    let message = accelerometer.curve(&wrong_scene()).unwrap_err().to_string();
+    assert!(message.contains("set resonance.sensor = \"q1\""), "{message}");
+}
+
+#[test]
+fn unequal_gaps_leave_the_points_as_they_are() {
+    let half = RIG.half_width;
+    let (b_plus, b_minus) = (Some(1.1 * half), Some(0.9 * half));
+    let skewed = Cavity { b_plus, b_minus, ..Cavity::IDEAL };
+    let [ideal, skewed] = [Cavity::IDEAL, skewed].map(|cavity| motion_at(cavity, 0.5 * half));
+    assert!((ideal[1] / skewed[1] - 1.0).abs() < 1e-11 && (ideal[2] / skewed[2] - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -789,58 +743,13 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
     for (damage, words) in cases {
         let mut damaged = good.clone();
         damage(&mut damaged);
-        let knowledge = scene.knowledge();
-        let parts = damaged.linear_decay(&knowledge).and_then(|_| damaged.parts(&knowledge));
-        let message = parts.unwrap_err().to_string();
+        let curve = damaged
+            .linear_decay(&scene.knowledge())
+            .and_then(|_| damaged.curve(&scene));
+        let message = curve.unwrap_err().to_string();
         let is_complete = words.iter().all(|word| message.contains(word));
         assert!(message.starts_with("record.csv") && is_complete, "{message}");
     }
-}
-
-#[test]
-fn the_effect_that_explains_a_misfit_is_named_with_its_strength() {
-    let known = ["b=0.0095±0.00003", "epsilon=0.00923±0.00003"].map(|one| one.parse().unwrap());
-    let friction = Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL };
-    let tilt = Cavity { tilt: 0.1, ..Cavity::IDEAL };
-    let cases = [
-        (friction, Effect::Friction, 0.03),
-        (tilt, Effect::Tilt, 0.1_f64.to_degrees()),
-        (Cavity::IDEAL, Effect::Hardening, 1e-3),
-    ];
-    for (cavity, effect, strength) in cases {
-        // The periodic motions of the rig, with the uncertainties of 60 dB. Harmonic balance: a cubic stiffness moves their frequency.
-        let h = if effect == Effect::Hardening { strength } else { 0.0 };
-        let motions = (0..10).map(|n| {
-            let c = 0.36 + 0.03 * f64::from(n);
-            let [response, omega, drive] = motion_at(cavity, c * RIG.half_width);
-            [response, omega * (1.0 + 0.75 * h * c * c).sqrt(), drive]
-        });
-        let points = measured(motions, 1e-4, 11);
-        let found = explain(&points, Definition::default(), &wrong_scene().plant, &known, |_| {}).unwrap();
-        let best = found.explains().unwrap_or_else(|| panic!("{found:?}"));
-        let Estimate { value, uncertainty } = best.strength;
-        assert!(best.effect == effect && found.ideal.is_rejected(), "{found:?}");
-        assert!(
-            (value - strength).abs() < 3.0 * uncertainty && uncertainty < 0.2 * strength,
-            "{found:?}"
-        );
-    }
-}
-
-/// Response, m, frequency, rad/s, and drive, m, of the rig with a cavity at this amplitude of the response.
-fn motion_at(cavity: Cavity, amplitude: f64) -> [f64; 3] {
-    let rig = Parameters { cavity, ..RIG };
-    let motion = resonant_motion(&rig, Definition::default(), amplitude, None).unwrap();
-    [amplitude, motion.omega, motion.amplitude]
-}
-
-#[test]
-fn unequal_gaps_leave_the_points_as_they_are() {
-    let half = RIG.half_width;
-    let (b_plus, b_minus) = (Some(1.1 * half), Some(0.9 * half));
-    let skewed = Cavity { b_plus, b_minus, ..Cavity::IDEAL };
-    let [ideal, skewed] = [Cavity::IDEAL, skewed].map(|cavity| motion_at(cavity, 0.5 * half));
-    assert!((ideal[1] / skewed[1] - 1.0).abs() < 1e-11 && (ideal[2] / skewed[2] - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -931,55 +840,7 @@ fn levels_whose_base_is_not_recorded_are_no_linear_decay() {
     assert_eq!(record.linear_decay(&scene.knowledge()).unwrap(), None);
     let measured = Measurements { recordings: vec![record], ..Measurements::default() };
     let message = find(&measured, &scene, |_| {}).unwrap_err().to_string();
-    assert!(
-        message.contains("the base x rests") && message.contains("connected"),
-        "{message}"
-    );
-}
-
-#[test]
-fn a_slow_drift_of_five_amplitudes_leaves_the_fit_as_it_is() {
-    let (scene, still) = (wrong_scene(), recording());
-    let mut drifting = still.clone();
-    let count = still.response.len() as f64;
-    for (n, value) in drifting.response.iter_mut().enumerate() {
-        *value += 0.02 * (n as f64 / count).powi(2);
-    }
-    let [still, drifting] = [still, drifting].map(|one| {
-        let parts = parts(&[one], &scene).unwrap().concat();
-        let points: Vec<MeasuredPoint> = parts.iter().filter_map(|part| part.point).collect();
-        fit(&points, Definition::default(), &scene.plant, &[]).unwrap()
-    });
-    for quantity in FITTED {
-        let [one, other] = [&still, &drifting].map(|fit| fit.estimate(*quantity).unwrap());
-        assert!(
-            (one.value - other.value).abs() < 0.5 * one.uncertainty,
-            "{quantity:?}: {one:?} {other:?}"
-        );
-    }
-    assert!(!drifting.is_rejected(), "{}", drifting.chi_square);
-}
-
-#[test]
-fn chi_square_of_each_channel_shows_uncertainties_of_the_wrong_size() {
-    let right = fitted(&points(2e-3, 3), &[]).unwrap();
-    assert!(
-        right.channels.iter().all(|one| one.verdict().is_none()),
-        "{:?}",
-        right.channels
-    );
-    let total: f64 = right.channels.iter().map(|one| one.expected).sum();
-    assert!((total - right.degrees as f64).abs() < 1e-6, "{total} {}", right.degrees);
-    // A point may lie anywhere along the curve: an error of one amplitude shows in the other as well.
-    for (factor, verdict) in [(0.2, std::cmp::Ordering::Less), (5.0, std::cmp::Ordering::Greater)] {
-        let mut points = points(2e-3, 3);
-        for point in &mut points {
-            point.drive.uncertainty *= factor;
-            point.response.uncertainty *= factor;
-        }
-        let tests = fitted(&points, &[]).unwrap().channels;
-        assert!(tests.iter().any(|one| one.verdict() == Some(verdict)), "{tests:?}");
-    }
+    assert!(message.contains("fewer than thirty periods"), "{message}");
 }
 
 /// A table with the columns of `text`, read as a recording.
@@ -1295,45 +1156,6 @@ fn a_channel_of_the_base_that_is_late_by_a_known_time_is_shifted() {
         let message = Recording::of(&contents, &Selection { late: Some(7.0), ..selection }).unwrap_err();
         assert!(message.to_string().contains("samples later"), "{message}");
     }
-}
-
-#[test]
-fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
-    let scene = Scene {
-        resonance: Definition { sensor: Sensor::Q1, ..Definition::default() },
-        ..wrong_scene()
-    };
-    for (of_response, of_base) in [(2, 2), (1, 0), (0, 1)] {
-        let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
-        let record = recorded_as(measurands);
-        let parts = parts(std::slice::from_ref(&record), &scene).unwrap();
-        let points: Vec<MeasuredPoint> = parts.iter().flatten().filter_map(|part| part.point).collect();
-        let of_points = fit(&points, scene.resonance, &scene.plant, &[]).unwrap();
-        let prepared = [record.prepared(&scene.knowledge()).unwrap()];
-        let followed = follow(&prepared, &parts, &[], scene.resonance, &scene.plant, &[]).unwrap();
-        println!(
-            "{measurands:?}: worst {:.2} u of {} points, {:.2} u of {} periods",
-            worst(&of_points),
-            points.len(),
-            worst(&followed.fit),
-            followed.periods
-        );
-        for fit in [&of_points, &followed.fit] {
-            let mut estimates = FITTED.iter().map(|quantity| fit.estimate(*quantity).unwrap());
-            let are_narrow = estimates.all(|one| one.uncertainty < 0.2 * one.value);
-            assert!(
-                worst(fit) < 3.0 && are_narrow && !fit.is_rejected(),
-                "{measurands:?} {fit:?}"
-            );
-        }
-        let [r, of_points] = [&followed.fit, &of_points].map(|fit| fit.estimate(Quantity::R).unwrap());
-        assert!(r.uncertainty < 0.2 * of_points.uncertainty, "{r:?} {of_points:?}");
-        assert!(followed.periods > 200 && followed.left_out.is_empty(), "{followed:?}");
-    }
-    // The scene's sensor reads v, and no accelerometer does.
-    let message = recorded_as([Measurand::Acceleration, Measurand::Displacement]).parts(&wrong_scene().knowledge());
-    let message = message.unwrap_err().to_string();
-    assert!(message.contains("set resonance.sensor = \"q1\""), "{message}");
 }
 
 #[test]

@@ -168,7 +168,7 @@ impl Columns {
         let far = |k: usize| record.linear.far(record.periods.omega[k]);
         let count = record.periods.time.len();
         let mut columns = Self {
-            increments: vec![vec![Complex64::ZERO; size + 3]],
+            increments: vec![vec![Complex64::ZERO; size + 4]],
             direct: Vec::new(),
             feedback: vec![Matrix2::zeros()],
             path: (0..count)
@@ -180,7 +180,7 @@ impl Columns {
         columns.increments[0][size + 2] = Complex64::ONE;
         for k in 0..count {
             let mut direct: Vec<Complex64> = rows[k * PARTS].iter().map(|force| force * far(k)).collect();
-            direct.push(Complex64::ZERO);
+            direct.extend([Complex64::ZERO, record.periods.held[k]]);
             columns.direct.push(direct);
         }
         for k in 0..count - 1 {
@@ -216,7 +216,7 @@ impl Columns {
         places: &[Place],
     ) {
         let (duration, power) = (record.steps[k], record.power);
-        let mut increments = vec![Complex64::ZERO; rows[0].len() + 1];
+        let mut increments = vec![Complex64::ZERO; rows[0].len() + 2];
         let mut derivatives = [Complex64::ZERO; 2];
         for (part, weight) in SIMPSON.iter().enumerate() {
             let left = 1.0 - part as f64 / PARTS as f64;

@@ -15,6 +15,8 @@ const FUNCTIONS: usize = 23;
 /// Standard uncertainty of the factor of an element's lag, of each component: closed forms of first order are that good. Mixtures at 75 dB have
 /// 1.00 ± 0.01.
 const U_LAG: f64 = 0.02;
+/// Share of a sample through which a base holds its amplitude, and its standard uncertainty: all of it in a simulation, none on a smooth base.
+const HELD: (f64, f64) = (0.5, 0.5);
 /// Information on u at the start: none, but for rounding.
 const START_INFORMATION: f64 = 1e-30;
 /// Uncertainty of the curvature of an element's own force, relative: what the uncertainties of a drawing move it by.
@@ -48,7 +50,7 @@ pub struct Estimate<'a> {
     columns: Columns,
 }
 
-/// The unknowns: spline, lag, and u at the start, real and imaginary part of each.
+/// The unknowns: spline, lag, u at the start, and the share of a sample through which the base holds its amplitude, real and imaginary part of each.
 pub struct Solution {
     /// Twice the negative logarithm of the likelihood, without constants.
     pub deviance: f64,
@@ -117,10 +119,13 @@ impl<'a> Estimate<'a> {
         })
     }
 
-    /// The path as given, without the errors of it, and no curvature expected of the force: for comparison.
+    /// The path as given, without the errors of it, no curvature expected of the force, and a smooth base: for comparison.
     pub fn with_given_path(mut self) -> Self {
         self.own.fill(Complex64::ZERO);
         self.columns.feedback.iter_mut().for_each(|one| one.fill(0.0));
+        for direct in &mut self.columns.direct {
+            direct.iter_mut().last().into_iter().for_each(|held| *held = Complex64::ZERO);
+        }
         self
     }
 
@@ -143,6 +148,9 @@ impl<'a> Estimate<'a> {
             normal[(2 * m + part, 2 * m + part)] += U_LAG.powi(-2);
             known[2 * m + part] += change * U_LAG.powi(-2);
             normal[(2 * m + 2 + part, 2 * m + 2 + part)] += START_INFORMATION;
+            // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
+            normal[(2 * m + 4 + part, 2 * m + 4 + part)] += HELD.1.powi(-2);
+            known[2 * m + 4 + part] += if part == 0 { HELD.0 } else { 0.0 } * HELD.1.powi(-2);
         }
         let right = known.clone();
         let constant = self.expect(&mut normal, &mut known, hyper[1]);
@@ -150,6 +158,8 @@ impl<'a> Estimate<'a> {
         let unknowns = normal.solve(&known);
         let deviance = filter.logarithms + products[(0, 0)] + constant - known.dot(&unknowns)
             + normal.ln_determinant()
+            + (HELD.0 / HELD.1).powi(2)
+            + 4.0 * HELD.1.ln()
             + 4.0 * (m - 2) as f64 * hyper[1].ln();
         let innovations = white.row(0).transpose() - white.rows(1, n).tr_mul(&unknowns);
         let innovations = innovations.as_slice().to_vec();

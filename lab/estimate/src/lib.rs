@@ -30,5 +30,5 @@ pub use fit::{Estimate, Hyper, Solution};
 pub use interpolation::{Basis, CubicSpline};
 pub use linear::Linear;
 pub use periods::Periods;
-pub use record::{Element, Immediate, Path, Record};
+pub use record::{Element, Immediate, Path, Record, Signals};
 pub use windows::{Window, probabilities, windows};

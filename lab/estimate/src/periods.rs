@@ -16,6 +16,8 @@ pub struct Periods {
     pub response: Vec<Complex64>,
     /// Fundamental of the linear response.
     pub linear: Vec<Complex64>,
+    /// Fundamental of what a base that holds its amplitude through a sample changes in the linear response.
+    pub held: Vec<Complex64>,
     /// Variance of a component of the fundamental of the response by noise.
     pub noise: Vec<f64>,
     /// Variance of a component of the fundamental of the base by noise.
@@ -95,17 +97,35 @@ fn average(values: &[Complex64], width: usize) -> Vec<Complex64> {
     (0..values.len()).map(mean).collect()
 }
 
-/// Turns of the response at each sample, from its fundamental, averaged three times over a period.
-fn turns(response: &[f64], step: f64) -> Vec<f64> {
+/// Fundamental of a signal at each sample, in the frame of `step` rad a sample, averaged three times over a period.
+fn envelope(signal: &[f64], step: f64) -> Vec<Complex64> {
     let width = (TAU / step).round() as usize;
     let mut envelope: Vec<Complex64> = (0..)
-        .zip(response)
+        .zip(signal)
         .map(|(k, y)| Complex64::cis(-step * f64::from(k)) * y)
         .collect();
     for _ in 0..3 {
         envelope = average(&envelope, width);
     }
-    let angles = unwrapped(envelope.iter().map(|value| value.arg()));
+    envelope
+}
+
+/// What a base has beside straight lines between its samples if it holds its amplitude from one to the next: it is late by half of each change.
+pub fn held(base: &[f64], step: f64) -> Vec<f64> {
+    let envelope = envelope(base, step);
+    let at = |k: usize| {
+        let before = envelope[k.saturating_sub(1)].norm();
+        let after = envelope[(k + 1).min(envelope.len() - 1)].norm();
+        // The frame turns a sine to -i/2 of its amplitude.
+        let sine = (envelope[k] * Complex64::cis(step * k as f64)).re / envelope[k].norm();
+        -0.5 * (after - before) * if sine.is_finite() { sine } else { 0.0 }
+    };
+    (0..base.len()).map(at).collect()
+}
+
+/// Turns of the response at each sample.
+fn turns(response: &[f64], step: f64) -> Vec<f64> {
+    let angles = unwrapped(envelope(response, step).iter().map(|value| value.arg()));
     (0..)
         .zip(angles)
         .map(|(k, angle)| (angle + step * f64::from(k)) / TAU)
@@ -135,7 +155,9 @@ impl Periods {
     /// A fit to one period finds the Fourier coefficient of a varying amplitude w, `w - i conj(w')/(2 omega) + (pi²/6 w'' - conj(w'')/4)/omega²`. What is
     /// beside w is taken off: of a decay by a tenth in a period it is 1e-2 and 4e-4 of w. Noise and second harmonic are
     /// those of what the smooth fundamental leaves: growth inside a period would inflate them.
-    pub fn new([response, linear, base]: [&[f64]; 3], sample_time: f64, omega: f64) -> Option<Self> {
+    /// `order`: how often the sensor of the response differentiates; it reads the derivative over this power of `omega`. The displacement follows from
+    /// `z = (omega/(i omega_k + d/dt))^order` of the fundamental, to the second order of its drift.
+    pub fn new([response, linear, base, held]: [&[f64]; 4], order: i32, sample_time: f64, omega: f64) -> Option<Self> {
         let step = omega * sample_time;
         let width = (TAU / step).round() as usize;
         // Twelve periods, and one at each end.
@@ -157,9 +179,12 @@ impl Periods {
             periods.omega.push(TAU * turn_per_sample / sample_time);
             periods.time.push((i as f64 + 0.5 * (j - i - 1) as f64) * sample_time);
         }
-        [periods.response, periods.linear] =
-            [response, linear].map(|signal| periods.smooth(&fits, &phases, signal, omega));
-        let envelope = CubicSpline::new(periods.time.clone(), periods.response.clone());
+        let smooth = |signal, order| periods.smooth(&fits, &phases, signal, order, omega);
+        let read = smooth(response, 0);
+        let [of_response, of_linear, of_held] =
+            [(response, order), (linear, 0), (held, 0)].map(|(signal, order)| smooth(signal, order));
+        [periods.response, periods.linear, periods.held] = [of_response, of_linear, of_held];
+        let envelope = CubicSpline::new(periods.time.clone(), read);
         let mut rest = response.to_vec();
         for (k, value) in rest.iter_mut().enumerate().take(edges[edges.len() - 1]).skip(edges[0]) {
             let t = k as f64 * sample_time;
@@ -168,7 +193,8 @@ impl Periods {
         for fit in &fits {
             let (coefficients, noise) = fit.of(&rest);
             let second = if coefficients.len() > 4 {
-                Complex64::new(coefficients[3], coefficients[4])
+                // The derivative of the second harmonic has twice its size, each time.
+                Complex64::new(coefficients[3], coefficients[4]) * Complex64::new(0.0, -0.5).powi(order)
             } else {
                 Complex64::ZERO
             };
@@ -181,7 +207,7 @@ impl Periods {
 
     /// Fundamental of a signal, without what its drift leaves in it. Drift is that in the frame of the response, whose phases in the middles of the
     /// periods are given: in a frame of constant frequency differences would miss a part of the detuning.
-    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], omega: f64) -> Vec<Complex64> {
+    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], order: i32, omega: f64) -> Vec<Complex64> {
         let one = |(fit, phase): (&Fit, &Complex64)| {
             let coefficients = fit.of(signal).0;
             Complex64::new(coefficients[1], coefficients[2]) * phase.conj()
@@ -194,6 +220,9 @@ impl Periods {
             let [rate, curvature] = [rates[k], curvatures[k]].map(|one| one * phases[k]);
             let own = z[k] * phases[k] + Complex64::i() * rate.conj() / (2.0 * omega_k)
                 - (curvature * (PI * PI / 6.0) - curvature.conj() / 4.0) / (omega_k * omega_k);
+            let n = f64::from(order);
+            let drift = rate * Complex64::i() * (n / omega_k) - curvature * (0.5 * n * (n + 1.0) / (omega_k * omega_k));
+            let own = (own + drift) * Complex64::new(0.0, -omega / omega_k).powi(order);
             own * Complex64::cis(-omega * self.time[k])
         };
         (0..z.len()).map(corrected).collect()

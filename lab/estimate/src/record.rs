@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use crate::interpolation::{CubicSpline, unwrapped};
 use crate::linear::Linear;
-use crate::periods::Periods;
+use crate::periods::{Periods, held};
 
 /// The force of what is not linear, by the amplitude of the response. Forces are displacements of the base, m, relative to the phase of the response.
 pub trait Element {
@@ -80,7 +80,29 @@ impl Path {
     }
 }
 
-/// A record of response and base, of displacements in metres, demodulated with a linear response.
+/// Equally spaced samples of a record.
+#[derive(Debug, Clone, Copy)]
+pub struct Signals<'a> {
+    /// The response, m, or its derivative over this power of omega0.
+    pub response: &'a [f64],
+    /// How often the sensor of the response differentiates: 0 to 2.
+    pub order: i32,
+    /// Displacement of the base, m.
+    pub base: &'a [f64],
+    /// What the sensor of the base reads, over a power of omega0, for its noise: white.
+    pub base_reading: &'a [f64],
+    /// Time between samples, s.
+    pub sample_time: f64,
+}
+
+impl<'a> Signals<'a> {
+    /// Of displacements.
+    pub fn of_displacements([response, base]: [&'a [f64]; 2], sample_time: f64) -> Self {
+        Self { response, order: 0, base, base_reading: base, sample_time }
+    }
+}
+
+/// A record of response and base, demodulated with a linear response.
 #[derive(Debug, Clone)]
 pub struct Record {
     /// The linear response.
@@ -118,11 +140,14 @@ fn averaged(values: &[f64]) -> Vec<f64> {
 
 impl Record {
     /// Demodulates equally spaced samples. `None` for fewer than twelve periods, or fewer than ten samples in a period.
-    pub fn new([response, base]: [&[f64]; 2], sample_time: f64, linear: Linear, power: i32) -> Option<Self> {
+    pub fn new(signals: &Signals, linear: Linear, power: i32) -> Option<Self> {
+        let Signals { response, order, base, base_reading, sample_time } = *signals;
         let mean = base.iter().sum::<f64>() / base.len() as f64;
         let moving: Vec<f64> = base.iter().map(|x| x - mean).collect();
+        let late = linear.response(&held(&moving, linear.omega0 * sample_time), sample_time);
         let mut periods = Periods::new(
-            [response, &linear.response(&moving, sample_time), base],
+            [response, &linear.response(&moving, sample_time), base_reading, &late],
+            order,
             sample_time,
             linear.omega0,
         )?;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use vines_estimate::{Estimate, Immediate, Linear, Periods, Record, probabilities};
+use vines_estimate::{Estimate, Immediate, Linear, Periods, Record, Signals, probabilities};
 
 const SAMPLE_TIME: f64 = 0.01;
 const LINEAR: Linear = Linear { omega0: TAU, zeta: 0.01 };
@@ -47,7 +47,7 @@ fn the_fundamental_of_a_decay_is_its_amplitude_at_the_middle_of_each_period() {
         (-rate * t).exp() * ((omega * t).sin() + 0.005 * (3.0 * omega * t).cos())
     });
     let zero = vec![0.0; signal.len()];
-    let periods = Periods::new([&signal, &zero, &zero], SAMPLE_TIME, TAU).expect("28 periods");
+    let periods = Periods::new([&signal, &zero, &zero, &zero], 0, SAMPLE_TIME, TAU).expect("28 periods");
     for k in 2..20 {
         let t = periods.time[k];
         let exact = (-rate * t).exp() * Complex64::cis((omega - TAU) * t);
@@ -67,7 +67,12 @@ fn a_linear_rig_has_its_own_drive_and_frequency_whatever_linear_response_is_assu
     let share = (half.sin() / half).powi(2);
     response.iter_mut().for_each(|y| *y = *y / share + 0.1 * noise());
     let measured: Vec<f64> = base.iter().map(|x| x + 1e-4 * noise()).collect();
-    let record = Record::new([&response, &measured], SAMPLE_TIME, LINEAR, 0).expect("400 periods");
+    let record = Record::new(
+        &Signals::of_displacements([&response, &measured], SAMPLE_TIME),
+        LINEAR,
+        0,
+    )
+    .expect("400 periods");
     // What the rig has beside the assumed response depends on the base as well, so that it is a function of the amplitude in steady motion only: here
     // it moves omega_R by 1e-5, half of the uncertainty at this noise, and by a fourteenth of that where the amplitude changes four times more slowly.
     let used: Vec<bool> = record.periods.time.iter().map(|t| *t > 100.0).collect();

@@ -88,7 +88,9 @@ impl Branch {
         if places[0][0] > places[places.len() - 1][0] {
             places.reverse();
         }
-        let fold = (0..places.len()).min_by(|i, j| places[*i][0].total_cmp(&places[*j][0])).unwrap_or(0);
+        let fold = (0..places.len())
+            .min_by(|i, j| places[*i][0].total_cmp(&places[*j][0]))
+            .unwrap_or(0);
         let mut rising: Backbone = Vec::new();
         for place in &places[fold..] {
             if rising.last().is_none_or(|last| place[0] > last[0] * (1.0 + 1e-9)) {
@@ -126,11 +128,7 @@ impl Misfit<1> for Distance<'_> {
 
 /// The curve of a linear structure with a cubic stiffness and without a particle, by first-order theory: `E = 2 zeta A/cos p` and
 /// `omega = omega0 (1 + 3/8 h (A/b)² - zeta tan p)` for a phase of p beyond phase resonance.
-pub(crate) fn spring(
-    [omega0, zeta, h, b]: [f64; 4],
-    definition: Definition,
-    [low, high]: [f64; 2],
-) -> Option<Branch> {
+pub(crate) fn spring([omega0, zeta, h, b]: [f64; 4], definition: Definition, [low, high]: [f64; 2]) -> Option<Branch> {
     let off = definition.off_resonance();
     debug_assert!(off.abs() < FRAC_PI_2);
     let place = |a: f64| {

@@ -11,9 +11,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use lovines::Parameters;
 use nalgebra::{DMatrix, Vector3};
+use num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
-use num_complex::Complex64;
 use vines_estimate::{Backbone, Basis, CubicSpline, Curve};
 use vines_model::Definition;
 use vines_model::numerics::{Estimate, LeastSquares, Misfit, Regression, SIGNIFICANT, equally_spaced, mean, range};
@@ -183,7 +183,10 @@ impl Fit {
     #[must_use]
     pub fn friction(&self) -> Option<Estimate> {
         let acts = self.hypothesis != Hypothesis::Friction && self.has_friction;
-        acts.then(|| Estimate { value: self.x[6], uncertainty: self.covariance[(6, 6)].max(0.0).sqrt() })
+        acts.then(|| Estimate {
+            value: self.x[6],
+            uncertainty: self.covariance[(6, 6)].max(0.0).sqrt(),
+        })
     }
 
     /// The probability of a larger chi-square if the hypothesis is right; `None` without a degree of freedom.
@@ -204,7 +207,10 @@ impl Fit {
 
     /// Why its own data reject it.
     fn rejection(&self) -> Option<String> {
-        let channels = self.channels.iter().filter_map(|one| Some((one.name.as_str(), one.p_value?)));
+        let channels = self
+            .channels
+            .iter()
+            .filter_map(|one| Some((one.name.as_str(), one.p_value?)));
         let every = channels.chain(self.p_value().map(|p| ("all data", p)));
         let (name, p) = every.min_by(|one, other| one.1.total_cmp(&other.1))?;
         (p < EXCLUDED).then(|| format!("p = {p:.1e} of {name}"))
@@ -245,7 +251,10 @@ impl Hypotheses {
     /// The range of a quantity over the possible cavities, as its middle and half its width; of the best one, if none is possible.
     #[must_use]
     pub fn range(&self, quantity: Quantity) -> Option<Estimate> {
-        let of = |fit: &Fit| fit.estimate(quantity).map(|one| [one.value - one.uncertainty, one.value + one.uncertainty]);
+        let of = |fit: &Fit| {
+            fit.estimate(quantity)
+                .map(|one| [one.value - one.uncertainty, one.value + one.uncertainty])
+        };
         let possible = self.possible().filter(|fit| fit.hypothesis.is_cavity()).filter_map(of);
         let [low, high] = possible
             .reduce(|[low, high], one| [low.min(one[0]), high.max(one[1])])
@@ -258,7 +267,9 @@ impl Hypotheses {
     pub fn undetermined(&self) -> Vec<Quantity> {
         let is_determined = |one: Estimate| one.value.abs() > SIGNIFICANT * one.uncertainty;
         let fitted = Quantity::FITTED.iter().copied();
-        fitted.filter(|quantity| !self.range(*quantity).is_some_and(is_determined)).collect()
+        fitted
+            .filter(|quantity| !self.range(*quantity).is_some_and(is_determined))
+            .collect()
     }
 }
 
@@ -296,7 +307,11 @@ impl Data {
             };
             (0..SHOWN).map(point).collect::<Vec<_>>()
         };
-        self.points.iter().copied().chain(self.curves.iter().flat_map(of_curve)).collect()
+        self.points
+            .iter()
+            .copied()
+            .chain(self.curves.iter().flat_map(of_curve))
+            .collect()
     }
 
     /// The fit less what is [shown](Self::shown), over the standard uncertainties: response, frequency, drive.
@@ -305,7 +320,10 @@ impl Data {
         let problem = self.problem(fit.hypothesis, fit.x);
         let spline = problem.start(&fit.x).and_then(|start| {
             let backbone = problem.at(&fit.x, &start)?.backbone;
-            let values = backbone.iter().map(|[_, drive, omega]| Complex64::new(*omega, *drive)).collect();
+            let values = backbone
+                .iter()
+                .map(|[_, drive, omega]| Complex64::new(*omega, *drive))
+                .collect();
             (backbone.len() > 3).then(|| CubicSpline::new(backbone.iter().map(|one| one[0]).collect(), values))
         });
         let of_curves = spline.map(|spline| {
@@ -316,14 +334,21 @@ impl Data {
             };
             self.shown()[self.points.len()..].iter().map(apart).collect::<Vec<_>>()
         });
-        fit.residuals.iter().copied().chain(of_curves.into_iter().flatten()).collect()
+        fit.residuals
+            .iter()
+            .copied()
+            .chain(of_curves.into_iter().flatten())
+            .collect()
     }
 
     /// What contradicts a fit most: a point, or the times at which a record has an amplitude.
     #[must_use]
     pub fn worst(&self, fit: &Fit) -> String {
         let (shown, apart) = (self.shown(), self.apart(fit));
-        let sizes = apart.iter().enumerate().flat_map(|(n, one)| one.iter().enumerate().map(move |(i, size)| (n, i, *size)));
+        let sizes = apart
+            .iter()
+            .enumerate()
+            .flat_map(|(n, one)| one.iter().enumerate().map(move |(i, size)| (n, i, *size)));
         let Some((n, channel, size)) = sizes.max_by(|one, other| one.2.abs().total_cmp(&other.2.abs())) else {
             return "nothing has its amplitudes".into();
         };
@@ -332,13 +357,18 @@ impl Data {
             None => format!("point {}", n + 1),
             Some(n) => {
                 let MeasuredCurve { origin, periods, .. } = &self.curves[n / SHOWN];
-                let near = periods.iter().filter(|[_, amplitude]| (amplitude / response - 1.0).abs() < ASIDE);
+                let near = periods
+                    .iter()
+                    .filter(|[_, amplitude]| (amplitude / response - 1.0).abs() < ASIDE);
                 let times = near.map(|[time, _]| *time);
                 let [from, to] = times.fold([f64::INFINITY, 0.0], |[from, to], time| [time.min(from), time.max(to)]);
                 format!("{origin} between {from:.2} s and {to:.2} s")
             }
         };
-        format!("the {what} of {place}, at a response of {response:.4e} m, is {:+.1} u off", -size)
+        format!(
+            "the {what} of {place}, at a response of {response:.4e} m, is {:+.1} u off",
+            -size
+        )
     }
 
     /// Refuses too few points, and numbers that are not positive.
@@ -348,7 +378,8 @@ impl Data {
         }
         for (n, point) in self.points.iter().enumerate() {
             let estimates = [point.response, point.omega, point.drive];
-            for (what, Estimate { value, uncertainty }) in ["response", "frequency", "drive"].into_iter().zip(estimates) {
+            for (what, Estimate { value, uncertainty }) in ["response", "frequency", "drive"].into_iter().zip(estimates)
+            {
                 let is_positive = |number: f64| number > 0.0 && number.is_finite();
                 if !(is_positive(value) && is_positive(uncertainty)) {
                     return Err(FitError::NotPositive { number: n + 1, what, value, uncertainty });
@@ -368,10 +399,15 @@ impl Data {
             .into_iter()
             .filter_map(|restitution| self.start(&Parameters { restitution, ..*expected }));
         let problem = self.problem(Hypothesis::Ideal, unknowns(expected));
-        let fit = problem.best(starts.chain([unknowns(expected)])).ok_or(FitError::NoMotion)?;
+        let fit = problem
+            .best(starts.chain([unknowns(expected)]))
+            .ok_or(FitError::NoMotion)?;
         let is_determined = |one: Estimate| one.uncertainty.is_finite() && one.uncertainty > 0.0;
         let mut estimates = Quantity::ALL.iter().filter_map(|quantity| fit.estimate(*quantity));
-        estimates.all(is_determined).then_some(fit).ok_or(FitError::Undetermined)
+        estimates
+            .all(is_determined)
+            .then_some(fit)
+            .ok_or(FitError::Undetermined)
     }
 
     /// The ideal cavity with the parameters of `plant`: its chi-square and residuals say whether the data belong to the plant, and its uncertainties are
@@ -398,8 +434,15 @@ impl Data {
             if self.is_excluded(hypothesis) {
                 continue;
             }
-            let start = if hypothesis.is_cavity() { x } else { self.linear(expected) };
-            let friction = fits.iter().find(|fit| fit.hypothesis == Hypothesis::Friction).map(|fit| fit.x);
+            let start = if hypothesis.is_cavity() {
+                x
+            } else {
+                self.linear(expected)
+            };
+            let friction = fits
+                .iter()
+                .find(|fit| fit.hypothesis == Hypothesis::Friction)
+                .map(|fit| fit.x);
             let with = |share: f64| {
                 let mut x = start;
                 (x[6], x[7]) = (Hypothesis::Friction.start(&x, share), hypothesis.start(&x, share));
@@ -411,13 +454,25 @@ impl Data {
                 (true, None) => STRENGTHS.map(with).to_vec(),
                 (true, Some(mut x)) => {
                     x[7] = hypothesis.start(&x, STRENGTHS[0]);
-                    vec![x, with(STRENGTHS[1])]
+                    let others = if hypothesis == Hypothesis::Tilt {
+                        &STRENGTHS[..]
+                    } else {
+                        &STRENGTHS[1..2]
+                    };
+                    std::iter::once(x)
+                        .chain(others.iter().map(|share| with(*share)))
+                        .collect()
                 }
             };
             fits.extend(problem.best(starts.into_iter()));
         }
         let least = fits.iter().map(|fit| fit.chi_square).fold(f64::INFINITY, f64::min);
-        let fewest = fits.iter().filter(|fit| fit.chi_square == least).map(|fit| fit.degrees).max().unwrap_or(0);
+        let fewest = fits
+            .iter()
+            .filter(|fit| fit.chi_square == least)
+            .map(|fit| fit.degrees)
+            .max()
+            .unwrap_or(0);
         for fit in &mut fits {
             let excess = fit.chi_square - least;
             let difference = fit.degrees.abs_diff(fewest).max(1) as f64;
@@ -430,7 +485,10 @@ impl Data {
 
     /// Whether it is known that something does not act.
     fn is_excluded(&self, hypothesis: Hypothesis) -> bool {
-        let zero = Known::Strength { hypothesis, estimate: Estimate { value: 0.0, uncertainty: 0.0 } };
+        let zero = Known::Strength {
+            hypothesis,
+            estimate: Estimate { value: 0.0, uncertainty: 0.0 },
+        };
         self.known.contains(&zero)
     }
 
@@ -493,14 +551,25 @@ impl Data {
         });
         let (_, [omega0, zeta, r, b, epsilon]) = fits.min_by(|first, second| first.0.total_cmp(&second.0))?;
         let mass = expected.primary_mass.ln();
-        Some(Unknowns::from([omega0.ln(), zeta, r, b.ln(), epsilon.ln(), mass, 0.0, 0.0]))
+        Some(Unknowns::from([
+            omega0.ln(),
+            zeta,
+            r,
+            b.ln(),
+            epsilon.ln(),
+            mass,
+            0.0,
+            0.0,
+        ]))
     }
 
     fn problem(&self, hypothesis: Hypothesis, x: Unknowns) -> Problem<'_> {
         let of_curve = |one: &MeasuredCurve| one.curve.basis.ends.map(f64::exp);
         let of_points = self.points.iter().map(|point| [point.response.value; 2]);
         let ends = of_points.chain(self.curves.iter().map(of_curve));
-        let range = ends.fold([f64::INFINITY, 0.0], |[low, high], one| [low.min(one[0]), high.max(one[1])]);
+        let range = ends.fold([f64::INFINITY, 0.0], |[low, high], one| {
+            [low.min(one[0]), high.max(one[1])]
+        });
         let mut phases: Vec<f64> = self.points.iter().map(|point| point.phase).collect();
         phases.push(-FRAC_PI_2);
         phases.sort_by(f64::total_cmp);
@@ -578,7 +647,10 @@ impl Problem<'_> {
 
     /// The curve at the data in closed form.
     fn closed(&self, x: &Unknowns) -> Option<AtData> {
-        let of = |phase: &f64| self.hypothesis.branch(x, self.data.definition.at_phase(*phase), self.range);
+        let of = |phase: &f64| {
+            self.hypothesis
+                .branch(x, self.data.definition.at_phase(*phase), self.range)
+        };
         let branches: Option<Vec<Branch>> = self.phases.iter().map(of).collect();
         let branches = branches?;
         let at = |phase: f64| self.phases.iter().position(|one| *one == phase).map(|n| &branches[n]);
@@ -638,7 +710,12 @@ impl Problem<'_> {
 
     /// Number of independent residuals.
     fn equations(&self) -> usize {
-        let of_curves = self.data.curves.iter().map(|one| one.curve.expected.len()).sum::<usize>();
+        let of_curves = self
+            .data
+            .curves
+            .iter()
+            .map(|one| one.curve.expected.len())
+            .sum::<usize>();
         let held = (0..UNKNOWNS).filter(|i| !self.is_free(*i)).count();
         2 * self.data.points.len() + of_curves + self.of_known(&self.held).len() - held
     }

@@ -26,3 +26,4 @@ pub use points::MeasuredPoint;
 pub use quantity::{Known, Quantity};
 pub use record::{Identified, Samples, Unidentified, identify};
 pub use regime::{Expected, Likelihoods, MOTIONS, RESOLUTION, TOLERANCES, one_to_one, rough_scene};
+pub use vines_estimate::Signals;

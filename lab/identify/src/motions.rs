@@ -80,7 +80,10 @@ pub(crate) struct Motions<'a> {
 impl Motions<'_> {
     /// b, m, and epsilon omega0, rad/s.
     fn units(&self) -> [f64; 2] {
-        [self.plant.half_width, self.plant.mass_ratio() * self.plant.natural_frequency()]
+        [
+            self.plant.half_width,
+            self.plant.mass_ratio() * self.plant.natural_frequency(),
+        ]
     }
 
     fn values(&self, motion: &PlantMotion) -> Vector3<f64> {
@@ -154,7 +157,12 @@ impl Motions<'_> {
             return place;
         };
         match self.on_line(n, &place.motion, [amplitude, place.motion.omega], [1.0, 0.0]) {
-            Some(motion) => Place { values: self.values(&motion), motion, is_found: true, ..place },
+            Some(motion) => Place {
+                values: self.values(&motion),
+                motion,
+                is_found: true,
+                ..place
+            },
             None => Place { is_found: false, ..place },
         }
     }
@@ -194,7 +202,9 @@ impl Motions<'_> {
 
 /// Standard uncertainties of response, frequency and drive.
 pub(crate) fn uncertainties(point: &MeasuredPoint) -> Vector3<f64> {
-    [point.response, point.omega, point.drive].map(|one| one.uncertainty).into()
+    [point.response, point.omega, point.drive]
+        .map(|one| one.uncertainty)
+        .into()
 }
 
 impl Place {
@@ -208,5 +218,7 @@ impl Place {
 /// The curve at the amplitudes of a record that it has, by rising amplitude.
 pub(crate) fn backbone(places: &[Place]) -> Backbone {
     let found = places.iter().filter(|place| place.is_found);
-    found.map(|place| [place.values[0], place.values[2], place.values[1]]).collect()
+    found
+        .map(|place| [place.values[0], place.values[2], place.values[1]])
+        .collect()
 }

@@ -13,6 +13,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use num_complex::Complex64;
 use vines_estimate::{Element, Path};
+use vines_model::Sensor;
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
 
 /// A particle in its cavity. Behind a host with harmonics the constants are effective ones.
@@ -24,7 +25,12 @@ pub struct Particle {
     pub b: f64,
     /// Restitution.
     pub r: f64,
+    /// What the response is: of v the force is the displacement of the particle, which is its impulses, integrated twice.
+    pub sensor: Sensor,
 }
+
+/// Of impulses that are integrated twice, minus their lag, in periods: `1/(i omega + d/dt)²` to the first order.
+const INTEGRATED: Complex64 = Complex64::new(0.0, 1.0 / PI);
 
 /// A steady motion: forces are displacements of the base, m.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +78,7 @@ impl Particle {
 
     /// The steady motion at an amplitude, m, and its lag: minus the response to a slow growth of ln A, to the first order, over the slope.
     pub fn steady_motion(&self, amplitude: f64) -> Steady {
-        let Self { epsilon, b, r } = *self;
+        let Self { epsilon, b, r, sensor } = *self;
         let ratio = (1.0 - r) / (1.0 + r);
         let k = ratio * ratio + FRAC_PI_2 * FRAC_PI_2;
         let fold = self.fold();
@@ -95,10 +101,11 @@ impl Particle {
             -2.0 * speed * late_theta,
         );
         let rise = Complex64::new(2.0 * speed_slope, -2.0 * speed * theta_slope);
+        let lag = -late / rise / TAU;
         Steady {
             force: unit * speed,
             slope: unit * rise / 2.0,
-            lag: -late / rise / TAU,
+            lag: if sensor == Sensor::V { lag - INTEGRATED } else { lag },
             exists: amplitude > fold,
         }
     }
@@ -165,6 +172,15 @@ impl Particle {
     }
 }
 
+/// The middle one of three forces, integrated twice.
+fn integrated(three: &[(f64, Complex64)], omega0: f64) -> (f64, Complex64) {
+    let [(before, first), (time, force), (after, last)] = [three[0], three[1], three[2]];
+    (
+        time,
+        force + INTEGRATED * (last - first) * (TAU / omega0 / (after - before)),
+    )
+}
+
 impl Element for Particle {
     fn steady(&self, amplitude: f64) -> Complex64 {
         self.steady_motion(amplitude).force
@@ -194,7 +210,11 @@ impl Element for Particle {
                 )
             };
             if impacts.len() >= FEWEST_IMPACTS {
-                stretches.push(impacts.windows(3).map(force).collect());
+                let forces: Vec<(f64, Complex64)> = impacts.windows(3).map(force).collect();
+                stretches.push(match self.sensor {
+                    Sensor::V => forces.windows(3).map(|three| integrated(three, path.omega0)).collect(),
+                    Sensor::Q1 => forces,
+                });
             }
         }
         Some(stretches)

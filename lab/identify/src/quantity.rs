@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use lovines::Parameters;
 use nalgebra::SVector;
-use vines_model::numerics::Estimate;
 use vines_model::ArgumentError;
+use vines_model::numerics::Estimate;
 use vines_scene::linear::{MeasuredLinear, ParticleState};
 
 use crate::hypothesis::Hypothesis;
@@ -201,14 +201,19 @@ impl FromStr for Known {
     fn from_str(text: &str) -> Result<Self, ArgumentError> {
         let quantities = Quantity::ALL.map(|quantity| quantity.symbol()[0]);
         let strengths = Hypothesis::ALL.map(|hypothesis| hypothesis.names()[1]);
-        let symbols = quantities.into_iter().chain(strengths).filter(|symbol| !symbol.is_empty());
+        let symbols = quantities
+            .into_iter()
+            .chain(strengths)
+            .filter(|symbol| !symbol.is_empty());
         let symbols = symbols.collect::<Vec<_>>().join(", ");
         let form = || {
             format!("`{text}`: expected SYMBOL=VALUE±UNCERTAINTY, for instance m=0.032±0.0005, with one of {symbols}")
         };
         let (symbol, numbers) = text.split_once('=').ok_or_else(form)?;
         let symbol = symbol.trim();
-        let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.symbol()[0] == symbol);
+        let quantity = Quantity::ALL
+            .into_iter()
+            .find(|quantity| quantity.symbol()[0] == symbol);
         let is_its = |hypothesis: &Hypothesis| !symbol.is_empty() && hypothesis.names()[1] == symbol;
         let hypothesis = Hypothesis::ALL.into_iter().find(is_its);
         let (value, uncertainty) = numbers

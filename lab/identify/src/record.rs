@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::SVector;
 use num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use vines_estimate::{Curve, Estimate, Record, Window};
+use vines_estimate::{Curve, Estimate, Record, Signals, Window};
 use vines_model::Sensor;
 use vines_model::numerics::{LeastSquares, Misfit};
 
@@ -13,15 +13,11 @@ use crate::ideal_rig::IdealRig;
 use crate::particle::Particle;
 use crate::regime::{Expected, TOLERANCES, one_to_one, rough_scene};
 
-/// The response is sampled at equal times, s, together with the base.
+/// A record, and what its sensors are.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
-    /// Displacement of the response, m.
-    pub response: &'a [f64],
-    /// Displacement of the base, m.
-    pub base: &'a [f64],
-    /// Time between samples, s.
-    pub sample_time: f64,
+    /// Response and base.
+    pub signals: Signals<'a>,
     /// What the response is.
     pub sensor: Sensor,
 }
@@ -134,7 +130,7 @@ fn effective(scene: &IdealRig, sensor: Sensor, power: i32) -> Option<Particle> {
     let backbone: Vec<[f64; 3]> = scene.backbone(sensor).into_iter().step_by(BACKBONE_STRIDE).collect();
     let particle = |x: &SVector<f64, 3>| {
         let [epsilon, b, r] = x.map(f64::exp).into();
-        Particle { epsilon, b, r: r / (1.0 + r) }
+        Particle { epsilon, b, r: r / (1.0 + r), sensor }
     };
     let residuals = |x: &SVector<f64, 3>| {
         let particle = particle(x);
@@ -159,12 +155,7 @@ fn power(sensor: Sensor) -> i32 {
 
 impl Samples<'_> {
     fn record(&self, scene: &IdealRig) -> Option<Record> {
-        Record::new(
-            [self.response, self.base],
-            self.sample_time,
-            scene.linear(),
-            power(self.sensor),
-        )
+        Record::new(&self.signals, scene.linear(), power(self.sensor))
     }
 }
 
@@ -186,7 +177,7 @@ pub fn identify(samples: &Samples, rough: &IdealRig) -> Result<Identified, Unide
 }
 
 fn passes(samples: &Samples, rough: &IdealRig, found: &mut BTreeSet<usize>) -> Option<Identified> {
-    let mut scene = rough_scene(&samples.record(rough)?, rough);
+    let mut scene = rough_scene(&samples.record(rough)?, rough, samples.sensor);
     for pass in 1..=PASSES {
         let record = samples.record(&scene)?;
         let particle = effective(&scene, samples.sensor, record.power)?;

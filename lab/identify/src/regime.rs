@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 use vines_estimate::{Record, Window, probabilities, windows};
+use vines_model::Sensor;
 
 use crate::ideal_rig::IdealRig;
 use crate::particle::Particle;
@@ -77,7 +78,7 @@ const MIXTURE_ROUNDS: usize = 10;
 const ALL_IMPACTS: usize = 2;
 
 /// A scene that fits the mixture of the motions: r and b on a grid, the rest by linear least squares, weighted by the motions' probabilities.
-pub fn rough_scene(record: &Record, scene: &IdealRig) -> IdealRig {
+pub fn rough_scene(record: &Record, scene: &IdealRig, sensor: Sensor) -> IdealRig {
     let scale = scene.epsilon * scene.b;
     let windows = windows(record, RESOLUTION * scale);
     let u = IdealRig::UNCERTAINTY;
@@ -85,7 +86,7 @@ pub fn rough_scene(record: &Record, scene: &IdealRig) -> IdealRig {
     let mut best = (f64::INFINITY, *scene);
     for r in steps().map(|step| (scene.r + u[2] * step).clamp(0.1, 0.95)) {
         for b in steps().map(|step| scene.b * (u[3] * step).exp()) {
-            let (cost, [epsilon, frequency, damping]) = mixture(&windows, scene, [r, b]);
+            let (cost, [epsilon, frequency, damping]) = mixture(&windows, scene, [r, b], sensor);
             let cost =
                 cost + (r - scene.r).powi(2) / (2.0 * u[2] * u[2]) + (b / scene.b).ln().powi(2) / (2.0 * u[3] * u[3]);
             if cost < best.0 {
@@ -99,11 +100,11 @@ pub fn rough_scene(record: &Record, scene: &IdealRig) -> IdealRig {
 }
 
 /// Cost, epsilon, and the force per amplitude by errors of frequency and damping, of windows with given r and b.
-fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2]) -> (f64, [f64; 3]) {
+fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2], sensor: Sensor) -> (f64, [f64; 3]) {
     let u = IdealRig::UNCERTAINTY;
     let scale = scene.epsilon * scene.b;
     let prior = [u[4] * scene.epsilon, 2.0 * u[0], 2.0 * u[1] * scene.zeta].map(|one| 1.0 / (2.0 * one * one));
-    let unit = Particle { epsilon: 1.0, b, r };
+    let unit = Particle { epsilon: 1.0, b, r, sensor };
     let steady: Vec<_> = windows
         .iter()
         .map(|window| unit.steady_motion(window.amplitude))
@@ -140,7 +141,7 @@ fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2]) -> (f64, [f64
         };
         found = solution;
         found[0] = found[0].max(scene.epsilon / 3.0);
-        let particle = Particle { epsilon: found[0], b, r };
+        let particle = Particle { epsilon: found[0], b, r, sensor };
         let expected = Expected {
             particle,
             host: Complex64::new(found[1], found[2]),

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use serde::Deserialize;
-use vines_estimate::{Element, Estimate, Linear, Record};
+use vines_estimate::{Element, Estimate, Linear, Record, Signals};
 use vines_identify::{IdealRig, Particle, Samples, identify, rough_scene};
 use vines_model::Sensor;
 
@@ -68,12 +68,17 @@ impl Prototype {
 
     fn particle(&self) -> Particle {
         let [_, _, r, b, epsilon] = self.truth;
-        Particle { epsilon, b, r }
+        Particle { epsilon, b, r, sensor: Sensor::Q1 }
     }
 
     fn record(&self, [response, base]: &[Vec<f64>; 2]) -> Record {
         let linear = Linear { omega0: TAU * self.truth[0], zeta: self.truth[1] };
-        Record::new([response, base], self.sample_time, linear, 2).expect("140 periods")
+        Record::new(
+            &Signals::of_displacements([response, base], self.sample_time),
+            linear,
+            2,
+        )
+        .expect("140 periods")
     }
 }
 
@@ -168,8 +173,13 @@ fn the_rough_scene_is_that_of_the_prototype() {
     let (prototype, samples) = Prototype::load();
     let rough = scene(prototype.scene);
     let [response, base] = &samples;
-    let record = Record::new([response, base], prototype.sample_time, rough.linear(), 2).expect("140 periods");
-    for (value, expected) in rough_scene(&record, &rough).values().into_iter().zip(prototype.rough) {
+    let signals = Signals::of_displacements([response, base], prototype.sample_time);
+    let record = Record::new(&signals, rough.linear(), 2).expect("140 periods");
+    for (value, expected) in rough_scene(&record, &rough, Sensor::Q1)
+        .values()
+        .into_iter()
+        .zip(prototype.rough)
+    {
         same([value], &[expected], 1e-6);
     }
 }
@@ -177,12 +187,8 @@ fn the_rough_scene_is_that_of_the_prototype() {
 #[test]
 fn the_parameters_are_those_of_the_prototype_within_their_uncertainty_and_the_true_ones_within_three() {
     let (prototype, [response, base]) = Prototype::load();
-    let samples = Samples {
-        response: &response,
-        base: &base,
-        sample_time: prototype.sample_time,
-        sensor: Sensor::Q1,
-    };
+    let signals = Signals::of_displacements([&response, &base], prototype.sample_time);
+    let samples = Samples { signals, sensor: Sensor::Q1 };
     let identified = identify(&samples, &scene(prototype.scene)).expect("1:1 motion");
     println!(
         "{:?} {:?}, chi-square {} ({})",

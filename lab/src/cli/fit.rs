@@ -175,7 +175,11 @@ fn gathered(
     let modes = scene.structure.as_ref().map_or(1, |structure| structure.modes.len());
     let Arguments { known, response, drive, time, rate, late, .. } = arguments.clone();
     let selection = Selection { response, drive, time, rate, late };
-    let mut measured = Measurements { known, calibration: arguments.calibration, ..Measurements::default() };
+    let mut measured = Measurements {
+        known,
+        calibration: arguments.calibration,
+        ..Measurements::default()
+    };
     let (mut skipped, mut notes) = (0, Vec::new());
     for path in &arguments.points {
         let (phase, source) = (scene.definition().phase, read(path).map_err(Failure::input)?);
@@ -296,7 +300,10 @@ fn recorded(stretches: &[Stretch]) -> String {
         let [low, high] = one.response_m.map(|amplitude| format!("{:.3}", 1e3 * amplitude));
         [from, to, one.motion.to_string(), low, high]
     });
-    Table::new("from, s | to, s | motion | smallest response, mm | largest, mm").rows(rows).text() + "\n"
+    Table::new("from, s | to, s | motion | smallest response, mm | largest, mm")
+        .rows(rows)
+        .text()
+        + "\n"
 }
 
 /// Every hypothesis in a row.
@@ -304,14 +311,26 @@ fn hypotheses(report: &FitReport) -> Table {
     let rows = report.hypotheses.iter().map(|one| {
         let HypothesisReport { hypothesis, symbol, unit, chi_square, degrees, .. } = one;
         let strength = one.strength.zip(one.u_strength).map(|(value, uncertainty)| {
-            format!("{symbol} = {}", with_unit(&with_decimals(Estimate { value, uncertainty }), unit))
+            format!(
+                "{symbol} = {}",
+                with_unit(&with_decimals(Estimate { value, uncertainty }), unit)
+            )
         });
         let friction = one.friction.zip(one.u_friction);
-        let friction = friction.map(|(value, uncertainty)| format!("mu = {}", with_decimals(Estimate { value, uncertainty })));
-        let value = |n: usize| one.parameters.get(n).map_or_else(String::new, |parameter| {
-            with_decimals(Estimate { value: parameter.value, uncertainty: parameter.uncertainty })
+        let friction =
+            friction.map(|(value, uncertainty)| format!("mu = {}", with_decimals(Estimate { value, uncertainty })));
+        let value = |n: usize| {
+            one.parameters.get(n).map_or_else(String::new, |parameter| {
+                with_decimals(Estimate { value: parameter.value, uncertainty: parameter.uncertainty })
+            })
+        };
+        let p = one.p_value.map_or_else(String::new, |p| {
+            if p < 1e-3 {
+                format!("{p:.0e}")
+            } else {
+                format!("{p:.3}")
+            }
         });
-        let p = one.p_value.map_or_else(String::new, |p| if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") });
         cells![
             *hypothesis,
             strength.into_iter().chain(friction).collect::<Vec<_>>().join(", "),
@@ -362,7 +381,10 @@ fn verdict(report: &FitReport) -> String {
     };
     match &possible[..] {
         [] => "none of these describes the data".into(),
-        some => format!("± is the range over what is possible: {}{undetermined}", some.join(", ")),
+        some => format!(
+            "± is the range over what is possible: {}{undetermined}",
+            some.join(", ")
+        ),
     }
 }
 
@@ -370,7 +392,11 @@ fn verdict(report: &FitReport) -> String {
 fn contradiction(found: &Found, report: &FitReport) -> String {
     match found.hypotheses.possible().next() {
         Some(_) => "a nonlinear spring without a particle describes the data: nothing in them shows impacts".into(),
-        None => format!("none of these hypotheses describes the data; nearest is {}: {}", report.best, found.worst()),
+        None => format!(
+            "none of these hypotheses describes the data; nearest is {}: {}",
+            report.best,
+            found.worst()
+        ),
     }
 }
 

@@ -8,7 +8,9 @@ use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
 use thiserror::Error;
-use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Quantity, Samples, Unidentified, identify};
+use vines_identify::{
+    IdealRig, Identified, MOTIONS, MeasuredCurve, Quantity, Samples, Signals, Unidentified, identify,
+};
 use vines_model::numerics::{Estimate, mean, range};
 use vines_model::{Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
@@ -92,6 +94,8 @@ impl RecordingError {
 const CLOCK_WINDOW: f64 = 2.5;
 /// Periods within which a constant hardly drifts.
 const SLOW: usize = 16;
+/// Periods at each end over which running means do not reach.
+const EDGE: f64 = 0.5 * (SLOW + 3) as f64;
 /// Fewest periods of a recording.
 const FEWEST_PERIODS: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
@@ -305,20 +309,35 @@ impl Recording {
         let one = self.prepared(&knowledge)?;
         one.plausible(&one.anchors(&knowledge), &knowledge)?;
         let Self { origin, sample_time, measurands, .. } = &one;
-        let natural = knowledge.linear.omega0 * sample_time;
-        let [response, base] = [0, 1].map(|channel| {
-            let values = if channel == 0 { &one.response } else { &one.drive };
-            // A filter before the sampling passes less of the natural frequency.
-            let passed = knowledge.target.displacement(channel, knowledge.linear.omega0).norm();
-            let found = displacements(values, measurands[channel], natural);
-            found.into_iter().map(|value| passed * value).collect::<Vec<f64>>()
-        });
-        let sensor = scene.definition().sensor;
-        let samples = Samples { response: &response, base: &base, sample_time: *sample_time, sensor };
-        let found = identify(&samples, &rough(scene)).map_err(|why| self.without_curve(&why))?;
+        // A filter before the sampling passes less of the natural frequency.
+        let passed = |channel: usize, values: &[f64]| {
+            let factor = knowledge.target.displacement(channel, knowledge.linear.omega0).norm();
+            values.iter().map(|value| factor * value).collect::<Vec<f64>>()
+        };
+        let [response, base_reading] = [passed(0, &one.response), passed(1, &one.drive)];
+        let base = displacements(&base_reading, measurands[1], knowledge.linear.omega0 * sample_time);
+        // At both ends the drift is not known.
+        let margin = (EDGE * (TAU / knowledge.linear.omega0 / sample_time).round()) as usize;
+        let inner = margin..response.len().saturating_sub(margin).max(margin);
+        let signals = Signals {
+            response: &response[inner.clone()],
+            order: measurands[0].order(),
+            base: &base[inner.clone()],
+            base_reading: &base_reading[inner],
+            sample_time: *sample_time,
+        };
+        let samples = Samples { signals, sensor: scene.definition().sensor };
+        let mut found = identify(&samples, &rough(scene)).map_err(|why| self.without_curve(&why))?;
+        found
+            .time
+            .iter_mut()
+            .for_each(|time| *time += margin as f64 * sample_time);
         let stretches = Stretch::all(&found);
         let periods = found.time.iter().zip(&found.amplitude).zip(&found.used);
-        let periods = periods.filter(|(_, used)| **used).map(|((time, amplitude), _)| [*time, *amplitude]).collect();
+        let periods = periods
+            .filter(|(_, used)| **used)
+            .map(|((time, amplitude), _)| [*time, *amplitude])
+            .collect();
         let curve = found.curve.resolved(POINT_RESOLUTION);
         let curve = curve.ok_or_else(|| self.without_curve(&Unidentified::default()))?;
         Ok((MeasuredCurve { origin: origin.clone(), curve, periods }, stretches))
@@ -336,7 +355,10 @@ impl Recording {
                  If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
             )));
         }
-        let both: Vec<[Harmonic; 2]> = anchors.iter().filter_map(|one| Some([one.response?, one.drive?])).collect();
+        let both: Vec<[Harmonic; 2]> = anchors
+            .iter()
+            .filter_map(|one| Some([one.response?, one.drive?]))
+            .collect();
         let [of_response, of_base] = [0, 1].map(|n| mean(both.iter().map(|one| one[n].amplitude)));
         let ratio = of_base / of_response;
         if ratio > 1.0 {
@@ -484,9 +506,16 @@ impl Stretch {
             match all.last_mut() {
                 Some(last) if last.motion == MOTIONS[*motion] => {
                     last.seconds[1] = seconds[1];
-                    last.response_m = [last.response_m[0].min(window.amplitude), last.response_m[1].max(window.amplitude)];
+                    last.response_m = [
+                        last.response_m[0].min(window.amplitude),
+                        last.response_m[1].max(window.amplitude),
+                    ];
                 }
-                _ => all.push(Self { seconds, response_m: [window.amplitude; 2], motion: MOTIONS[*motion] }),
+                _ => all.push(Self {
+                    seconds,
+                    response_m: [window.amplitude; 2],
+                    motion: MOTIONS[*motion],
+                }),
             }
         }
         all
