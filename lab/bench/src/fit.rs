@@ -109,6 +109,7 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
         known: measured.known.clone(),
         definition: scene.definition(),
         calibration: measured.calibration,
+        scene: (!measured.recordings.is_empty()).then(|| recording::rough(scene)),
     };
     let linear = linear_verdicts(&measured.linear, &data, &scene.plant)?;
     data.known.extend(linear.iter().map(|one| Known::Linear(one.linear)));

@@ -23,9 +23,9 @@ const START_INFORMATION: f64 = 1e-30;
 const SHAPE: f64 = 0.25;
 /// Rounds of path, lag and variances.
 const PATH_ROUNDS: usize = 3;
-/// Limits of the three: 1 % to all of what is beyond the lag, as an amplitude; any curvature of S; noise from half to
-/// four times the measured one, as an amplitude.
-const VARIANCE_LIMITS: [[f64; 2]; 3] = [[1e-4, 1.0], [1e-5, 30.0], [0.2, 20.0]];
+/// Limits of the three: 1 % to all of what is beyond the lag, as an amplitude; any curvature of S; noise from half to a
+/// hundred times what the samples of a period show, as an amplitude: behind a filter they show little.
+const VARIANCE_LIMITS: [[f64; 2]; 3] = [[1e-4, 1.0], [1e-5, 30.0], [0.2, 1e4]];
 
 /// Share of the force beyond its lag, roughness of S over the scale of the force, and noise of the response over the measured one.
 pub type Hyper = [f64; 3];
@@ -124,7 +124,11 @@ impl<'a> Estimate<'a> {
         self.own.fill(Complex64::ZERO);
         self.columns.feedback.iter_mut().for_each(|one| one.fill(0.0));
         for direct in &mut self.columns.direct {
-            direct.iter_mut().last().into_iter().for_each(|held| *held = Complex64::ZERO);
+            direct
+                .iter_mut()
+                .last()
+                .into_iter()
+                .for_each(|held| *held = Complex64::ZERO);
         }
         self
     }

@@ -155,9 +155,13 @@ impl Periods {
     /// A fit to one period finds the Fourier coefficient of a varying amplitude w, `w - i conj(w')/(2 omega) + (pi²/6 w'' - conj(w'')/4)/omega²`. What is
     /// beside w is taken off: of a decay by a tenth in a period it is 1e-2 and 4e-4 of w. Noise and second harmonic are
     /// those of what the smooth fundamental leaves: growth inside a period would inflate them.
-    /// `order`: how often the sensor of the response differentiates; it reads the derivative over this power of `omega`. The displacement follows from
-    /// `z = (omega/(i omega_k + d/dt))^order` of the fundamental, to the second order of its drift.
-    pub fn new([response, linear, base, held]: [&[f64]; 4], order: i32, sample_time: f64, omega: f64) -> Option<Self> {
+    /// `readings`: what the sensors of response and base read.
+    pub fn new(
+        [response, linear, held]: [&[f64]; 3],
+        readings: [&[f64]; 2],
+        sample_time: f64,
+        omega: f64,
+    ) -> Option<Self> {
         let step = omega * sample_time;
         let width = (TAU / step).round() as usize;
         // Twelve periods, and one at each end.
@@ -179,12 +183,9 @@ impl Periods {
             periods.omega.push(TAU * turn_per_sample / sample_time);
             periods.time.push((i as f64 + 0.5 * (j - i - 1) as f64) * sample_time);
         }
-        let smooth = |signal, order| periods.smooth(&fits, &phases, signal, order, omega);
-        let read = smooth(response, 0);
-        let [of_response, of_linear, of_held] =
-            [(response, order), (linear, 0), (held, 0)].map(|(signal, order)| smooth(signal, order));
-        [periods.response, periods.linear, periods.held] = [of_response, of_linear, of_held];
-        let envelope = CubicSpline::new(periods.time.clone(), read);
+        [periods.response, periods.linear, periods.held] =
+            [response, linear, held].map(|signal| periods.smooth(&fits, &phases, signal, omega));
+        let envelope = CubicSpline::new(periods.time.clone(), periods.response.clone());
         let mut rest = response.to_vec();
         for (k, value) in rest.iter_mut().enumerate().take(edges[edges.len() - 1]).skip(edges[0]) {
             let t = k as f64 * sample_time;
@@ -193,21 +194,25 @@ impl Periods {
         for fit in &fits {
             let (coefficients, noise) = fit.of(&rest);
             let second = if coefficients.len() > 4 {
-                // The derivative of the second harmonic has twice its size, each time.
-                Complex64::new(coefficients[3], coefficients[4]) * Complex64::new(0.0, -0.5).powi(order)
+                Complex64::new(coefficients[3], coefficients[4])
             } else {
                 Complex64::ZERO
             };
             periods.second.push(second);
-            periods.noise.push(noise.min(fit.white(response)));
-            periods.base_noise.push(fit.white(base));
+            // What is left of an integral has not the noise of its sensor.
+            let [white, of_base] = readings.map(|reading| fit.white(reading));
+            let is_displacement = readings[0] == response;
+            periods
+                .noise
+                .push(if is_displacement { noise.min(white) } else { white });
+            periods.base_noise.push(of_base);
         }
         Some(periods)
     }
 
     /// Fundamental of a signal, without what its drift leaves in it. Drift is that in the frame of the response, whose phases in the middles of the
     /// periods are given: in a frame of constant frequency differences would miss a part of the detuning.
-    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], order: i32, omega: f64) -> Vec<Complex64> {
+    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], omega: f64) -> Vec<Complex64> {
         let one = |(fit, phase): (&Fit, &Complex64)| {
             let coefficients = fit.of(signal).0;
             Complex64::new(coefficients[1], coefficients[2]) * phase.conj()
@@ -220,9 +225,6 @@ impl Periods {
             let [rate, curvature] = [rates[k], curvatures[k]].map(|one| one * phases[k]);
             let own = z[k] * phases[k] + Complex64::i() * rate.conj() / (2.0 * omega_k)
                 - (curvature * (PI * PI / 6.0) - curvature.conj() / 4.0) / (omega_k * omega_k);
-            let n = f64::from(order);
-            let drift = rate * Complex64::i() * (n / omega_k) - curvature * (0.5 * n * (n + 1.0) / (omega_k * omega_k));
-            let own = (own + drift) * Complex64::new(0.0, -omega / omega_k).powi(order);
             own * Complex64::cis(-omega * self.time[k])
         };
         (0..z.len()).map(corrected).collect()

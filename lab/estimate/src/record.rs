@@ -83,14 +83,12 @@ impl Path {
 /// Equally spaced samples of a record.
 #[derive(Debug, Clone, Copy)]
 pub struct Signals<'a> {
-    /// The response, m, or its derivative over this power of omega0.
+    /// Displacement of the response, m.
     pub response: &'a [f64],
-    /// How often the sensor of the response differentiates: 0 to 2.
-    pub order: i32,
     /// Displacement of the base, m.
     pub base: &'a [f64],
-    /// What the sensor of the base reads, over a power of omega0, for its noise: white.
-    pub base_reading: &'a [f64],
+    /// What the sensors of response and base read, over a power of omega0, whose noise is white: the displacements, or their derivatives.
+    pub readings: [&'a [f64]; 2],
     /// Time between samples, s.
     pub sample_time: f64,
 }
@@ -98,7 +96,7 @@ pub struct Signals<'a> {
 impl<'a> Signals<'a> {
     /// Of displacements.
     pub fn of_displacements([response, base]: [&'a [f64]; 2], sample_time: f64) -> Self {
-        Self { response, order: 0, base, base_reading: base, sample_time }
+        Self { response, base, readings: [response, base], sample_time }
     }
 }
 
@@ -141,13 +139,13 @@ fn averaged(values: &[f64]) -> Vec<f64> {
 impl Record {
     /// Demodulates equally spaced samples. `None` for fewer than twelve periods, or fewer than ten samples in a period.
     pub fn new(signals: &Signals, linear: Linear, power: i32) -> Option<Self> {
-        let Signals { response, order, base, base_reading, sample_time } = *signals;
+        let Signals { response, base, readings, sample_time } = *signals;
         let mean = base.iter().sum::<f64>() / base.len() as f64;
         let moving: Vec<f64> = base.iter().map(|x| x - mean).collect();
         let late = linear.response(&held(&moving, linear.omega0 * sample_time), sample_time);
         let mut periods = Periods::new(
-            [response, &linear.response(&moving, sample_time), base_reading, &late],
-            order,
+            [response, &linear.response(&moving, sample_time), &late],
+            readings,
             sample_time,
             linear.omega0,
         )?;

@@ -47,7 +47,7 @@ fn the_fundamental_of_a_decay_is_its_amplitude_at_the_middle_of_each_period() {
         (-rate * t).exp() * ((omega * t).sin() + 0.005 * (3.0 * omega * t).cos())
     });
     let zero = vec![0.0; signal.len()];
-    let periods = Periods::new([&signal, &zero, &zero, &zero], 0, SAMPLE_TIME, TAU).expect("28 periods");
+    let periods = Periods::new([&signal, &zero, &zero], [&signal, &zero], SAMPLE_TIME, TAU).expect("28 periods");
     for k in 2..20 {
         let t = periods.time[k];
         let exact = (-rate * t).exp() * Complex64::cis((omega - TAU) * t);

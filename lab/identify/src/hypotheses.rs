@@ -7,7 +7,7 @@
 //! A hypothesis is excluded where a channel rejects it, or where its chi-square exceeds the smallest one by more than chance allows. What remains is
 //! possible, and the range of a parameter is that over what remains.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use lovines::Parameters;
 use nalgebra::{DMatrix, Vector3};
@@ -21,6 +21,7 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 
 use crate::branch::Branch;
 use crate::hypothesis::{Hypothesis, STRENGTHS, impact_speed, plant};
+use crate::ideal_rig::IdealRig;
 use crate::motions::{AMPLITUDES, Goal, Motions, Place, backbone, uncertainties};
 use crate::points::MeasuredPoint;
 use crate::quantity::{Known, Quantity, STEP, UNKNOWNS, Unknowns, gradient, moved, unknowns};
@@ -49,6 +50,8 @@ pub struct Data {
     pub definition: Definition,
     /// Standard uncertainty of the gain of the reference.
     pub calibration: f64,
+    /// The rig that a record was made on, about: without it a short noisy decay determines nothing.
+    pub scene: Option<IdealRig>,
 }
 
 /// Fewest points: two equations each for five parameters, and one to spare.
@@ -175,8 +178,16 @@ impl Fit {
         let value = |x: &Unknowns| self.hypothesis.strength([x[6], x[7]], x[2], self.speed);
         let gradient = gradient(&self.x, value);
         let variance = (gradient.transpose() * self.covariance * gradient)[0];
-        (self.hypothesis != Hypothesis::Ideal)
-            .then(|| Estimate { value: value(&self.x), uncertainty: variance.max(0.0).sqrt() })
+        let uncertainty = match self.hypothesis {
+            // The square of a tilt may be 0.
+            Hypothesis::Tilt => {
+                let mut above = self.x;
+                above[7] += self.covariance[(7, 7)].max(0.0).sqrt();
+                value(&above) - value(&self.x)
+            }
+            _ => variance.max(0.0).sqrt(),
+        };
+        (self.hypothesis != Hypothesis::Ideal).then(|| Estimate { value: value(&self.x), uncertainty })
     }
 
     /// The friction, where it acts beside another effect.
@@ -222,6 +233,8 @@ impl Fit {
 pub struct Hypotheses {
     /// Their fits.
     pub fits: Vec<Fit>,
+    /// Whether what is expected of the rig counts.
+    has_scene: bool,
 }
 
 impl Hypotheses {
@@ -262,14 +275,19 @@ impl Hypotheses {
         Some(Estimate { value: 0.5 * (low + high), uncertainty: 0.5 * (high - low) })
     }
 
-    /// The fitted quantities that the data do not determine: the interval of three standard uncertainties contains 0.
+    /// The fitted quantities that the data do not determine: the interval of three standard uncertainties contains 0, or its standard uncertainty is
+    /// most of that of the scene.
     #[must_use]
     pub fn undetermined(&self) -> Vec<Quantity> {
-        let is_determined = |one: Estimate| one.value.abs() > SIGNIFICANT * one.uncertainty;
-        let fitted = Quantity::FITTED.iter().copied();
-        fitted
-            .filter(|quantity| !self.range(*quantity).is_some_and(is_determined))
-            .collect()
+        let is_determined = |(quantity, of_scene): &(Quantity, f64)| {
+            self.range(*quantity).is_some_and(|one| {
+                let scale = if *quantity == Quantity::R { 1.0 } else { one.value };
+                let is_of_scene = self.has_scene && one.uncertainty > 0.5 * of_scene * scale;
+                one.value.abs() > SIGNIFICANT * one.uncertainty && !is_of_scene
+            })
+        };
+        let fitted = Quantity::FITTED.iter().copied().zip(IdealRig::UNCERTAINTY);
+        fitted.filter(|one| !is_determined(one)).map(|one| one.0).collect()
     }
 }
 
@@ -443,25 +461,18 @@ impl Data {
                 .iter()
                 .find(|fit| fit.hypothesis == Hypothesis::Friction)
                 .map(|fit| fit.x);
-            let with = |share: f64| {
-                let mut x = start;
+            let with = |mut x: Unknowns, share: f64| {
                 (x[6], x[7]) = (Hypothesis::Friction.start(&x, share), hypothesis.start(&x, share));
                 x
             };
             let problem = self.problem(hypothesis, start);
             let starts: Vec<Unknowns> = match (problem.has_motions(), friction) {
                 (false, _) => vec![start],
-                (true, None) => STRENGTHS.map(with).to_vec(),
+                (true, None) => STRENGTHS.map(|share| with(start, share)).to_vec(),
                 (true, Some(mut x)) => {
                     x[7] = hypothesis.start(&x, STRENGTHS[0]);
-                    let others = if hypothesis == Hypothesis::Tilt {
-                        &STRENGTHS[..]
-                    } else {
-                        &STRENGTHS[1..2]
-                    };
-                    std::iter::once(x)
-                        .chain(others.iter().map(|share| with(*share)))
-                        .collect()
+                    // Where an ideal cavity is far from the data, the rig that is expected may be nearer.
+                    vec![x, with(start, STRENGTHS[1]), with(unknowns(expected), STRENGTHS[0])]
                 }
             };
             fits.extend(problem.best(starts.into_iter()));
@@ -480,7 +491,7 @@ impl Data {
             let exceeds = exceeds.then(|| format!("chi-square exceeds the smallest by {excess:.0}"));
             fit.excluded = fit.rejection().or(exceeds);
         }
-        Ok(Hypotheses { fits })
+        Ok(Hypotheses { fits, has_scene: self.scene.is_some() })
     }
 
     /// Whether it is known that something does not act.
@@ -699,13 +710,30 @@ impl Problem<'_> {
     /// Residuals of what is known, and of the unknowns that are held.
     fn of_known(&self, x: &Unknowns) -> Vec<f64> {
         let strength = |effect: Hypothesis| match effect == self.hypothesis || effect == Hypothesis::Friction {
-            true => effect.strength([x[6], x[7]], x[2], self.speed),
+            true => effect.strength(
+                [6, 7].map(|i| if self.is_free(i) { x[i] } else { 0.0 }),
+                x[2],
+                self.speed,
+            ),
             false => 0.0,
         };
         let known = self.data.known.iter().flat_map(|known| known.residuals(x, &strength));
         let calibration = (self.hypothesis == Hypothesis::Reference).then(|| x[7] / self.data.calibration);
+        let scene = self.data.scene.iter().flat_map(|scene| {
+            let values = [x[0].exp() / TAU, x[1], x[2], x[3].exp(), x[4].exp()];
+            let [f0, zeta, r, b, epsilon] = IdealRig::UNCERTAINTY;
+            let u = [
+                f0 * scene.f0,
+                zeta * scene.zeta,
+                r,
+                b * scene.b,
+                epsilon * scene.epsilon,
+            ];
+            let off = move |i: usize| (values[i] - scene.values()[i]) / u[i];
+            (0..5).filter(|i| self.is_free(*i)).map(off).collect::<Vec<f64>>()
+        });
         let held = (0..UNKNOWNS).filter(|i| !self.is_free(*i)).map(|i| x[i] - self.held[i]);
-        known.chain(calibration).chain(held).collect()
+        known.chain(calibration).chain(scene).chain(held).collect()
     }
 
     /// Number of independent residuals.
@@ -830,7 +858,7 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
         limits[1] = [0.0, 1.0];
         limits[2] = [1e-3, 1.0];
         // Neither friction nor the square of a tilt is negative.
-        limits[6][0] = 0.0;
+        limits[6] = [0.0, 1.0];
         if self.hypothesis == Hypothesis::Tilt {
             limits[7][0] = 0.0;
         }

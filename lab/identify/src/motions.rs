@@ -217,8 +217,11 @@ impl Place {
 
 /// The curve at the amplitudes of a record that it has, by rising amplitude.
 pub(crate) fn backbone(places: &[Place]) -> Backbone {
-    let found = places.iter().filter(|place| place.is_found);
-    found
-        .map(|place| [place.values[0], place.values[2], place.values[1]])
-        .collect()
+    let mut rising: Backbone = Vec::new();
+    for place in places.iter().filter(|place| place.is_found) {
+        if rising.last().is_none_or(|last| place.values[0] > last[0]) {
+            rising.push([place.values[0], place.values[2], place.values[1]]);
+        }
+    }
+    rising
 }

@@ -223,7 +223,8 @@ impl FromStr for Known {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
         let (value, uncertainty) = number(value).zip(number(uncertainty)).ok_or_else(form)?;
         let may_be_0 = matches!(quantity, None | Some(Quantity::Zeta | Quantity::Damping));
-        if uncertainty < 0.0 || value < 0.0 || (value == 0.0 && !may_be_0) {
+        let may_be_negative = matches!(hypothesis, Some(Hypothesis::Cubic | Hypothesis::Reference));
+        if uncertainty < 0.0 || (value < 0.0 && !may_be_negative) || (value == 0.0 && !may_be_0) {
             return Err(format!("`{text}`: the value must be positive, and its uncertainty positive or 0").into());
         }
         let estimate = Estimate { value, uncertainty };

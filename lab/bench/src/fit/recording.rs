@@ -94,6 +94,8 @@ impl RecordingError {
 const CLOCK_WINDOW: f64 = 2.5;
 /// Periods within which a constant hardly drifts.
 const SLOW: usize = 16;
+/// How often the drift of an integral is removed.
+const PASSES: usize = 2;
 /// Periods at each end over which running means do not reach.
 const EDGE: f64 = 0.5 * (SLOW + 3) as f64;
 /// Fewest periods of a recording.
@@ -155,7 +157,7 @@ impl Recording {
             values
                 .iter_mut()
                 .for_each(|value| *value = knowledge.target.in_metres(channel, *value));
-            remove_drift(values, (TAU / linear.omega0 / self.sample_time).round() as usize);
+            remove_drift(values, (TAU / linear.omega0 / self.sample_time).round() as usize, SLOW);
         }
         Ok(one)
     }
@@ -314,16 +316,16 @@ impl Recording {
             let factor = knowledge.target.displacement(channel, knowledge.linear.omega0).norm();
             values.iter().map(|value| factor * value).collect::<Vec<f64>>()
         };
-        let [response, base_reading] = [passed(0, &one.response), passed(1, &one.drive)];
-        let base = displacements(&base_reading, measurands[1], knowledge.linear.omega0 * sample_time);
+        let readings = [passed(0, &one.response), passed(1, &one.drive)];
+        let natural = knowledge.linear.omega0 * sample_time;
+        let [response, base] = [0, 1].map(|channel| displacements(&readings[channel], measurands[channel], natural));
         // At both ends the drift is not known.
         let margin = (EDGE * (TAU / knowledge.linear.omega0 / sample_time).round()) as usize;
         let inner = margin..response.len().saturating_sub(margin).max(margin);
         let signals = Signals {
             response: &response[inner.clone()],
-            order: measurands[0].order(),
             base: &base[inner.clone()],
-            base_reading: &base_reading[inner],
+            readings: [&readings[0][inner.clone()], &readings[1][inner]],
             sample_time: *sample_time,
         };
         let samples = Samples { signals, sensor: scene.definition().sensor };
@@ -404,9 +406,9 @@ impl Recording {
 }
 
 /// Removes what changes slowly: running means over a period of the natural frequency, three times, which the oscillation does not pass, and over
-/// [`SLOW`] periods, so that the noise near the natural frequency stays white. At both ends a straight line goes on.
-pub(super) fn remove_drift(values: &mut [f64], period: usize) {
-    let slow = (SLOW * period).min((values.len() / 2).saturating_sub(2 * period));
+/// `slow` periods. At both ends a straight line goes on.
+fn remove_drift(values: &mut [f64], period: usize, slow: usize) {
+    let slow = (slow * period).min((values.len() / 2).saturating_sub(2 * period));
     let mut drift = values.to_vec();
     for length in [period, period, period, slow] {
         let first: f64 = drift[..length].iter().sum();
@@ -474,7 +476,7 @@ struct Anchor {
 }
 
 /// The ideal rig of a scene: what is expected of the one that was recorded.
-fn rough(scene: &Scene) -> IdealRig {
+pub(super) fn rough(scene: &Scene) -> IdealRig {
     let of = |quantity: Quantity| quantity.of_plant(&scene.plant);
     IdealRig {
         f0: of(Quantity::F0),
@@ -533,7 +535,10 @@ fn displacements(values: &[f64], of: Measurand, natural: f64) -> Vec<f64> {
             sum += (0.5 * natural).tan() * (before + *value);
             (before, *value) = (*value, sum);
         }
-        remove_drift(&mut values, (TAU / natural).round() as usize);
+        // An integral raises the noise below the natural frequency.
+        for _ in 0..PASSES {
+            remove_drift(&mut values, (TAU / natural).round() as usize, 1);
+        }
     }
     values
 }
