@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use lovines::{Cavity, Drive, Parameters, Plant, Restitution, State};
 use nalgebra::Complex;
 use vines_model::orbit::{
-    DriveCondition, NoMotion, PlantMotion, exact_backbone, periodic_motion, resonant_motion, resonant_motion_under,
+    Condition, NoMotion, PlantMotion, exact_backbone, periodic_motion, resonant_motion, resonant_motion_under,
     settled_motion,
 };
 use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
@@ -202,8 +202,8 @@ fn a_motion_is_found_from_another_one_at_a_given_drive_and_by_simulation() {
     let p = rig(Cavity { kinetic_friction: 0.031, ..Cavity::IDEAL });
     let [fresh, warm] = [None, Some(&near)].map(|guess| resonant_motion(&p, STUDY, RESPONSE, guess).expect("a motion"));
     same(&p, &fresh.state, &warm.state, 1.0, 1e-11);
-    let amplitude = DriveCondition::Amplitude(fresh.amplitude);
-    let again = periodic_motion(&p, STUDY, &near, [amplitude, DriveCondition::PhaseResonance]);
+    let amplitude = Condition::Excitation(Dimensionless::of(&p, fresh.amplitude).g);
+    let again = periodic_motion(&p, STUDY, &near, [amplitude, Condition::Phase(STUDY.phase)]);
     close(again.expect("a motion").omega / fresh.omega, 1.0, 1e-11);
     for cavity in effects() {
         let (p, near) = (rig(cavity), resonant(cavity, STUDY));

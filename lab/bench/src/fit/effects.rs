@@ -14,9 +14,9 @@ use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Restitution};
 use nalgebra::Vector3;
 use serde::Serialize;
-use vines_model::Definition;
 use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, mean};
-use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
+use vines_model::orbit::{Condition, PlantMotion, periodic_motion, resonant_motion};
+use vines_model::{Definition, Dimensionless};
 
 use super::{
     FEWEST_POINTS, Fit, FitError, Known, LEFT_OUT, LIMITS, LinearVerdict, MeasuredPoint, Nearest, Part, Problem,
@@ -554,14 +554,17 @@ impl PlantCurve<'_> {
         if !(0.0 < x[2] && x[2] <= 1.0) {
             return None;
         }
-        let [length, rate] = units(x);
+        let (plant, definition) = (self.plant(x), self.definition(n));
+        let (numbers, phase) = (Dimensionless::of(&plant, 0.0), definition.phase);
         let at = [
-            near.response.norm() + ahead * tangent[0] * length,
-            near.omega + ahead * tangent[1] * rate,
+            near.response.norm() / numbers.b + ahead * tangent[0],
+            numbers.sigma(near.omega) + ahead * tangent[1],
         ];
-        let across = DriveCondition::Across { at, normal: tangent };
-        let conditions = [DriveCondition::PhaseResonance, across];
-        periodic_motion(&self.plant(x), self.definition(n), near, conditions).ok()
+        let conditions = [
+            Condition::Phase(phase),
+            Condition::Across { phase, at, normal: tangent },
+        ];
+        periodic_motion(&plant, definition, near, conditions).ok()
     }
 
     fn plant(&self, x: &Unknowns) -> Parameters {

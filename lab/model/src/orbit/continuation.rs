@@ -10,8 +10,9 @@
 use nalgebra::{Matrix4, Matrix6};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
-use super::periodic::{Bifurcation, Condition, Periodic, wrapped};
-use super::return_map::{Bounce, ImpactPattern, Unknowns};
+use super::impacts::{Bounce, ImpactPattern, ImpactSection};
+use super::periodic::{Periodic, wrapped};
+use super::return_map::{Bifurcation, Condition, Unknowns};
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
 
@@ -216,8 +217,9 @@ impl Curve<'_> {
     /// The direction of the curve, and the sign of its equations' determinant, which is the same all along the curve.
     fn tangent(&self, at: &Periodic, towards: &Unknowns) -> Option<(Unknowns, f64)> {
         let mut matrix = Matrix6::zeros();
-        matrix.fixed_rows_mut::<4>(0).copy_from(&at.map.by);
-        let (_, by) = self.condition.value(self.scene, self.pattern, &at.unknowns(), &at.map);
+        matrix.fixed_rows_mut::<4>(0).copy_from(&at.map.closing());
+        let map = &mut ImpactSection { scene: self.scene, pattern: self.pattern };
+        let (_, by) = self.condition.value(map, &at.unknowns(), &at.map);
         matrix.set_row(4, &by);
         matrix.set_row(5, &towards.transpose());
         let mut right = Unknowns::zeros();
@@ -325,11 +327,11 @@ impl Curve<'_> {
     fn crossings(&self, chord: Unknowns, [from, to]: [&Periodic; 2]) -> Vec<BranchBifurcation> {
         let at = self.beside(from, chord);
         let crossing = |kind: Bifurcation| {
-            let [first, last] = [from, to].map(|motion| kind.test(&motion.map.monodromy));
+            let [first, last] = [from, to].map(|motion| kind.test(&motion.map.monodromy()));
             if first * last >= 0.0 || first.abs().max(last.abs()) < TEST_FUNCTION_ROUNDING {
                 return None;
             }
-            let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy) * first > 0.0);
+            let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy()) * first > 0.0);
             let (_, beyond) = try_bisection::<()>(0.0, 1.0, LOCATION_FRACTION, like_first).ok()?;
             let motion = at(beyond)?;
             // Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
@@ -343,7 +345,7 @@ impl Curve<'_> {
         };
         let kinds = [
             Bifurcation::Fold,
-            Bifurcation::flip(self.pattern),
+            Bifurcation::flip(self.pattern.mirrored),
             Bifurcation::NeimarkSacker,
         ];
         let mut found: Vec<_> = kinds.into_iter().filter_map(crossing).collect();
@@ -440,7 +442,7 @@ pub(super) fn branch_off(
 ) -> Option<Branch> {
     let from = &at.motion;
     // The eigenvector of the map for the multiplier -1.
-    let svd = (from.map.monodromy + Matrix4::identity()).svd(false, true);
+    let svd = (from.map.monodromy() + Matrix4::identity()).svd(false, true);
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);

@@ -1,125 +1,18 @@
-//! Periodic motions of any pattern of impacts: the equations that close and select them, Newton's method, stability, and the motion near a
-//! simulated state (docs/regimes.md, eq. 26).
+//! Periodic motions of any pattern of impacts, and the motion near a simulated state.
 
 use std::f64::consts::TAU;
 
 use lovines::{InvalidValue, State};
-use nalgebra::{Complex, Matrix4, Matrix6, RowVector6, SVector, Vector4};
+use nalgebra::{SVector, Vector4};
 use serde::Serialize;
 
-use super::return_map::{Bounce, ImpactPattern, Impacts, ReturnMap, Unknowns, follow};
-use super::stability;
+use super::impacts::{Bounce, ImpactPattern, ImpactSection, Impacts};
+use super::return_map::{Closing, Condition, Return, Unknowns, stability};
 use crate::Dimensionless;
-use crate::numerics::{Equations, newton};
 
 /// A phase in (-pi, pi].
 pub(super) fn wrapped(phase: f64) -> f64 {
     phase - TAU * (phase / TAU).round()
-}
-
-/// An equation that selects a motion, in addition to the four that close it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Condition {
-    /// sigma has this value.
-    Sigma(f64),
-    /// G has this value.
-    Excitation(f64),
-    /// A multiplier, or a pair of them, is on the unit circle.
-    Bifurcation(Bifurcation),
-    /// The unknowns lie in a plane: the end of a step along a curve.
-    Plane {
-        /// A point of the plane.
-        through: Unknowns,
-        /// Its normal, of length 1.
-        normal: Unknowns,
-    },
-}
-
-/// How stability changes at a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Bifurcation {
-    /// A multiplier passes +1: the frequency response turns back.
-    #[serde(rename = "fold")]
-    Fold,
-    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
-    #[serde(rename = "symmetry breaking")]
-    SymmetryBreaking,
-    /// A multiplier of the whole period passes -1.
-    #[serde(rename = "period doubling")]
-    PeriodDoubling,
-    /// A complex pair leaves the unit circle: modulation begins where the motion was stable.
-    #[serde(rename = "Neimark-Sacker")]
-    NeimarkSacker,
-}
-
-/// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
-const MAP_DIFFERENCE: f64 = 1e-6;
-
-impl Bifurcation {
-    /// As in a table.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::NeimarkSacker => "Neimark-Sacker",
-        }
-    }
-
-    /// The one at which a multiplier of a pattern's map is -1.
-    pub(super) fn flip(pattern: &ImpactPattern) -> Self {
-        if pattern.mirrored {
-            Bifurcation::SymmetryBreaking
-        } else {
-            Bifurcation::PeriodDoubling
-        }
-    }
-
-    /// Zero where the multipliers of a map are on the unit circle as the bifurcation says, and smooth also where multipliers meet.
-    pub(super) fn test(self, map: &Matrix4<f64>) -> f64 {
-        match self {
-            Bifurcation::Fold => (map - Matrix4::identity()).determinant(),
-            Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (map + Matrix4::identity()).determinant(),
-            // The products of two multipliers are the eigenvalues of the second compound matrix.
-            Bifurcation::NeimarkSacker => {
-                let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-                let minor = |(a, b): (usize, usize), (c, d): (usize, usize)| {
-                    map[(a, c)] * map[(b, d)] - map[(a, d)] * map[(b, c)]
-                };
-                let compound = Matrix6::from_fn(|row, column| minor(pairs[row], pairs[column]));
-                (compound - Matrix6::identity()).determinant()
-            }
-        }
-    }
-}
-
-impl Condition {
-    /// The value of the equation and its derivative by the unknowns.
-    pub(super) fn value(
-        &self,
-        scene: &Dimensionless,
-        pattern: &ImpactPattern,
-        x: &Unknowns,
-        map: &ReturnMap,
-    ) -> (f64, RowVector6<f64>) {
-        let unit = |n: usize| RowVector6::from_fn(|_, column| f64::from(u8::from(column == n)));
-        match *self {
-            Condition::Sigma(sigma) => (x[4] - sigma, unit(4)),
-            Condition::Excitation(g) => (x[5] - g, unit(5)),
-            Condition::Plane { through, normal } => (normal.dot(&(x - through)), normal.transpose()),
-            Condition::Bifurcation(kind) => {
-                let value = |map: &ReturnMap| kind.test(&map.monodromy);
-                // Central differences; NaN where the pattern ends.
-                let at = |n: usize, step: f64| {
-                    let mut moved = *x;
-                    moved[n] += step;
-                    follow(scene, pattern, &moved, |_, _| {}).map_or(f64::NAN, |map| value(&map))
-                };
-                let slope = |n: usize| (at(n, MAP_DIFFERENCE) - at(n, -MAP_DIFFERENCE)) / (2.0 * MAP_DIFFERENCE);
-                (value(map), RowVector6::from_fn(|_, n| slope(n)))
-            }
-        }
-    }
 }
 
 /// An exact periodic motion.
@@ -151,29 +44,7 @@ pub struct Periodic {
     pub neutral: bool,
     /// The map with its derivatives.
     #[serde(skip)]
-    pub(super) map: ReturnMap,
-}
-
-/// The equations of a motion: four that close it, and two that select it.
-struct Closing<'a> {
-    scene: &'a Dimensionless,
-    pattern: &'a ImpactPattern,
-    conditions: [Condition; 2],
-}
-
-impl Equations<6> for Closing<'_> {
-    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>)> {
-        let map = follow(self.scene, self.pattern, x, |_, _| {})?;
-        let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
-        jacobian.fixed_rows_mut::<4>(0).copy_from(&map.by);
-        residual.fixed_rows_mut::<4>(0).copy_from(&map.residual);
-        for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
-            let (value, by) = condition.value(self.scene, self.pattern, x, &map);
-            jacobian.set_row(row, &by);
-            residual[row] = value;
-        }
-        Some((residual, jacobian))
-    }
+    pub(super) map: Return,
 }
 
 impl Periodic {
@@ -185,26 +56,26 @@ impl Periodic {
         guess: &Unknowns,
         conditions: [Condition; 2],
     ) -> Option<Self> {
-        let x = newton(&mut Closing { scene, pattern, conditions }, *guess)?;
+        let map = &mut ImpactSection { scene, pattern };
+        let x = Closing { map, conditions }.solve(*guess)?;
         Self::at(scene, pattern, &x)
     }
 
     /// The motion at unknowns that satisfy the closing equations.
     fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
         let (mut bounces, mut duration, mut travelled) = (Vec::new(), 0.0, 0.0);
-        let map = follow(scene, pattern, x, |bounce, time| {
+        let map = ImpactSection { scene, pattern }.follow(x, |bounce, time| {
             bounces.push(bounce);
             duration += time;
             travelled += bounce.dq2.abs() * time;
         })?;
-        let mut multipliers: [Complex<f64>; 4] = map.monodromy.complex_eigenvalues().into();
-        multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
+        let multipliers = map.multipliers();
         let [stable, neutral] = stability(multipliers[3].norm());
         Some(Self {
             g: x[5],
             sigma: x[4],
-            c: map.s.norm(),
-            gamma: wrapped(map.s.arg()),
+            c: map.response.norm(),
+            gamma: wrapped(map.response.arg()),
             b: travelled / duration,
             pattern: pattern.clone(),
             bounces,

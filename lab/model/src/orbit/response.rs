@@ -7,8 +7,9 @@
 use serde::Serialize;
 
 use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
-use super::periodic::{Bifurcation, Condition, LONGEST_PATTERN, Periodic};
-use super::return_map::ImpactPattern;
+use super::impacts::ImpactPattern;
+use super::periodic::{LONGEST_PATTERN, Periodic};
+use super::return_map::{Bifurcation, Condition};
 use super::study::{least_excitation, symmetric_orbits};
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};

@@ -14,9 +14,10 @@ use nalgebra::{Complex, Matrix2, Vector2};
 use serde::Serialize;
 
 use super::half_period::HalfPeriod;
-use super::periodic::{Bifurcation, wrapped};
+use super::periodic::wrapped;
+use super::return_map::{Bifurcation, ON_CIRCLE, stability};
 use super::symmetric::{Interval, Particle, Reading, SymmetricMotion, SymmetricMotions, harmonic, intervals, search};
-use super::{AfterImpact, ON_CIRCLE, Orbit, stability};
+use super::{AfterImpact, Orbit};
 use crate::numerics::{self, Equations, equally_spaced, newton, try_bisection};
 use crate::oscillator::section;
 use crate::theory::SlowFlow;
