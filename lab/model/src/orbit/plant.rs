@@ -106,17 +106,17 @@ pub fn resonant_motion(
     if let Some(result) = near_guess.filter(|result| *result != Err(NoMotion::NotConverged)) {
         return result;
     }
-    let of_response = |scene: &Dimensionless| at_amplitude(scene, response / scene.b);
+    let of_response = |scene: &Dimensionless| at_amplitude(scene, c);
     // In the middle of the speeds B where the first-order motion is stable.
     let in_the_middle =
         |scene: &Dimensionless| at_speed(scene, 0.5 * (Manifold::new(scene.r).b_min() + B_SYMMETRY_BREAKING));
     let ideal = Ideal::of(parameters, definition, of_response).ok_or(NoMotion::NoIdealMotion(response))?;
-    let motion = Ideal { response, ..ideal }.continued(parameters, definition, Some(response));
+    let motion = Ideal { c, ..ideal }.continued(parameters, definition, Some(c));
     if motion.as_ref().is_ok_and(PlantMotion::is_stable) {
         return motion;
     }
-    let detour = Ideal::of(parameters, definition, in_the_middle)
-        .map(|ideal| ideal.continued(parameters, definition, Some(response)));
+    let detour =
+        Ideal::of(parameters, definition, in_the_middle).map(|ideal| ideal.continued(parameters, definition, Some(c)));
     match detour {
         Some(Ok(again)) if motion.as_ref().is_ok_and(|motion| motion.growth() <= again.growth()) => motion,
         Some(Ok(again)) => Ok(again),
@@ -145,10 +145,13 @@ pub fn resonant_motion_under(
     definition: Definition,
     amplitude: f64,
 ) -> Result<PlantMotion, NoMotion> {
-    PhaseSection::new(parameters, definition, 1)?;
-    let motion = |scene: &Dimensionless| stable_resonant(&Dimensionless { g: scene.excitation(amplitude), ..*scene });
-    let ideal = Ideal::of(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
-    Ideal { amplitude, ..ideal }.continued(parameters, definition, None)
+    let g = PhaseSection::new(parameters, definition, 1)?
+        .numbers
+        .excitation(amplitude);
+    let motion = |scene: &Dimensionless| stable_resonant(&Dimensionless { g, ..*scene });
+    let mut ideal = Ideal::of(parameters, definition, motion).ok_or(NoMotion::NoIdealMotionUnder(amplitude))?;
+    ideal.at[5] = g;
+    ideal.continued(parameters, definition, None)
 }
 
 /// Rounding error of a multiplier that is 1.
@@ -194,13 +197,11 @@ struct Ideal {
     /// Speed of the impacts, m/s.
     speed: f64,
     restitution: f64,
-    /// Amplitude of the response, m.
-    response: f64,
-    /// Phase of the base at the state after an impact on w = +b, angular frequency and amplitude of the base.
+    /// Amplitude of the response, over the mean gap.
+    c: f64,
+    /// The state after an impact on w = +b: phase of the base, rad, and unknowns.
     phase: f64,
-    state: State,
-    omega: f64,
-    amplitude: f64,
+    at: Unknowns,
 }
 
 /// Rounds in which speed of the impacts and coefficient of restitution, which depend on each other, are found. A remainder is a worse start.
@@ -212,31 +213,17 @@ impl Ideal {
         let [plus, minus] = p.gaps();
         let [half_width, middle] = [0.5 * (plus + minus), 0.5 * (plus - minus)];
         let rebound = Rebound::new(p);
-        let mut speed = half_width * p.natural_frequency();
-        let mut ideal = None;
+        let unit = half_width * p.natural_frequency();
+        let (mut speed, mut ideal) = (unit, None);
         for _ in 0..SPEED_ROUNDS {
             let [plus, minus] = Wall::BOTH.map(|wall| rebound.mean(wall, speed));
-            let restitution = 0.5 * (plus + minus);
-            let plant = Parameters { half_width, restitution, ..*p };
-            let scene = Dimensionless { definition, ..Dimensionless::of(&plant, 0.0) };
-            let motion = motion(&scene)?;
-            let (unit, rate, before) = (half_width, half_width * scene.omega0, speed);
-            speed = motion.impact_velocity * rate;
-            let start = motion.start;
-            ideal = Some(Self {
-                speed,
-                restitution,
-                response: motion.c * unit,
-                phase: start.phase,
-                state: State {
-                    q1: start.q1 * unit,
-                    dq1: start.dq1 * rate,
-                    q2: start.q2 * unit - middle,
-                    dq2: start.dq2 * rate,
-                },
-                omega: motion.omega * scene.omega0,
-                amplitude: scene.amplitude(motion.g),
-            });
+            let (restitution, before) = (0.5 * (plus + minus), speed);
+            let Orbit { c, start, sigma, g, impact_velocity, .. } =
+                motion(&numbers(&Parameters { restitution, ..*p }, definition))?;
+            speed = impact_velocity * unit;
+            let q2 = start.q2 - middle / half_width;
+            let at = Unknowns::from([start.q1, start.dq1, q2, start.dq2, sigma, g]);
+            ideal = Some(Self { speed, restitution, c, phase: start.phase, at });
             if speed == before {
                 break;
             }
@@ -244,31 +231,18 @@ impl Ideal {
         ideal
     }
 
-    /// The motion at phase resonance with all effects under the drive of the ideal motion or, if `response` is given, with this response, m.
-    fn continued(
-        &self,
-        p: &Parameters,
-        definition: Definition,
-        response: Option<f64>,
-    ) -> Result<PlantMotion, NoMotion> {
-        let numbers = numbers(p, definition);
-        let (mut phase, mut at) = (self.phase, unknowns(&numbers, &self.state, self.omega, self.amplitude));
+    /// The motion at phase resonance with all effects under the drive of the ideal motion or, if `c` is given, with this response over the mean gap.
+    fn continued(&self, p: &Parameters, definition: Definition, c: Option<f64>) -> Result<PlantMotion, NoMotion> {
+        let (mut phase, mut at) = (self.phase, self.at);
         // Up to 1 the effects grow, from 1 to 2 the response changes.
-        let end = if response.is_none_or(|response| response == self.response) {
-            1.0
-        } else {
-            2.0
-        };
+        let end = if c.is_none_or(|c| c == self.c) { 1.0 } else { 2.0 };
         let (mut done, mut increase, mut side) = (0.0, 1.0, None);
         loop {
             let next = f64::min(done + increase, if done < 1.0 { 1.0 } else { end });
             let partial = self.with_effects(p, next.min(1.0));
-            let second = match response {
-                Some(end) => {
-                    let response = self.response + (next - 1.0).max(0.0) * (end - self.response);
-                    Condition::response(definition.phase, response / numbers.b)
-                }
-                None => Condition::Excitation(at[5]),
+            let second = match c {
+                Some(c) => Condition::response(definition.phase, self.c + (next - 1.0).max(0.0) * (c - self.c)),
+                None => Condition::Excitation(self.at[5]),
             };
             let conditions = [Condition::Phase(definition.phase), second];
             let found = PhaseSection::new(&partial, definition, 1)?.solve(phase, at, conditions);
@@ -499,5 +473,84 @@ impl ReturnMap for PhaseSection<'_> {
         let (before, mut x) = (self.phase, *x);
         self.centre(&mut x, true)?;
         (self.phase != before).then_some(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::impacts::{ImpactPattern, ImpactSection};
+    use super::*;
+
+    /// Largest differences of the derivatives of a return, and of its response, from central differences.
+    fn off(map: &mut impl ReturnMap, x: &Unknowns) -> [f64; 2] {
+        let step = 1e-6;
+        let here = map.at(x).expect("a return");
+        let mut off = [0.0_f64; 2];
+        for n in 0..6 {
+            let [after, before] = [step, -step].map(|step| {
+                let mut moved = *x;
+                moved[n] += step;
+                map.at(&moved).expect("a return")
+            });
+            let apart = (after.apart - before.apart) / (2.0 * step) - here.closing().column(n);
+            let response = (after.response - before.response) / (2.0 * step) - here.response_by[n];
+            off = [off[0].max(apart.amax()), off[1].max(response.norm())];
+        }
+        off
+    }
+
+    #[test]
+    fn the_derivatives_of_both_return_maps_are_those_of_differences() {
+        let scene = Dimensionless {
+            definition: Definition {
+                reference: crate::Reference::Force,
+                sensor: crate::Sensor::Q1,
+                ..Definition::default()
+            },
+            ..Dimensionless::new(0.05, 1.2, 0.6, 0.0)
+        };
+        let ideal = at_speed(&scene, 0.9).expect("an orbit");
+        let x = ideal.unknowns() + Unknowns::from([0.01, 0.002, -0.01, 0.02, 0.1, 0.05]);
+        let symmetric = ImpactPattern::symmetric();
+        for pattern in [symmetric.doubled(), symmetric.doubled().doubled(), symmetric] {
+            let off = off(&mut ImpactSection { scene: &scene, pattern: &pattern }, &x);
+            assert!(off[0] < 1e-6 && off[1] < 1e-6, "{pattern:?}: {off:?}");
+        }
+        let cavity = Cavity {
+            kinetic_friction: 0.003,
+            tilt: 0.002,
+            b_plus: Some(1.02),
+            ..Cavity::IDEAL
+        };
+        let p = Parameters {
+            cavity,
+            ..Parameters::dimensionless(scene.epsilon, scene.lambda, scene.r)
+        };
+        let motion = resonant_motion(&p, scene.definition, ideal.c, None).expect("a motion");
+        let mut section = PhaseSection::new(&p, scene.definition, 2).expect("a plant");
+        let mut x = unknowns(&section.numbers, &motion.state, motion.omega, motion.amplitude);
+        section.centre(&mut x, false);
+        let off = off(&mut section, &(x + Unknowns::repeat(1e-3)));
+        assert!(off[0] < 1e-6 && off[1] < 1e-6, "{off:?}");
+    }
+
+    #[test]
+    fn a_motion_of_a_pattern_is_selected_by_phase_and_amplitude_of_its_response() {
+        let scene = Dimensionless::new(0.01, 1.2, 0.65, 0.0);
+        for phase in [-90.0_f64, -75.0] {
+            let scene = Dimensionless {
+                definition: scene.definition.at_phase(phase.to_radians()),
+                ..scene
+            };
+            let exact = at_speed(&scene, 0.9).expect("an orbit");
+            let map = &mut ImpactSection { scene: &scene, pattern: &ImpactPattern::symmetric() };
+            let conditions = [
+                Condition::Phase(scene.definition.phase),
+                Condition::response(scene.definition.phase, exact.c),
+            ];
+            let near = exact.unknowns() + Unknowns::from([0.0, 0.0, 0.0, 0.0, 0.01, -0.01]);
+            let found = Closing { map, conditions }.solve(near).expect("a motion");
+            assert!((found - exact.unknowns()).norm() < 1e-10, "{found} {exact:?}");
+        }
     }
 }
