@@ -13,7 +13,7 @@ use vines_model::{
 };
 
 mod common;
-use common::{Row, rows};
+use common::{Row, at_phase_zero, rows, symmetric};
 
 #[test]
 fn orbits_match_the_references_to_all_their_digits_and_others_are_on_the_unstable_left_branch() {
@@ -104,7 +104,7 @@ fn scene(g: f64) -> Dimensionless {
 fn repeats_on_the_plant(scene: &Dimensionless, branch: &Branch) {
     let slow = branch.points.iter().filter(|motion| motion.moduli()[3] < 10.0);
     for motion in slow.step_by(10) {
-        let [_, start @ ..] = motion.motion(scene, 1)[0];
+        let start = at_phase_zero(scene, motion);
         let mut plant = scene.plant(start).unwrap();
         let drive = Dimensionless { g: motion.g, ..*scene }.drive(motion.sigma);
         for n in 1..=2 * motion.pattern.periods() {
@@ -126,8 +126,7 @@ fn an_exact_response_passes_folds_breaks_its_symmetry_and_has_motions_that_the_p
         let points = || branches().flat_map(|branch| &branch.points);
         assert!(points().any(|one| one.stable) && points().any(|one| !one.stable));
         let special = |kind| {
-            found
-                .symmetric()
+            symmetric(&found)
                 .flat_map(|branch| &branch.special)
                 .filter(move |one| one.kind == kind)
         };

@@ -165,16 +165,18 @@ impl<'a> Motion<'a> {
             restitution: rig.particle.restitution,
             cavity: Cavity::IDEAL,
         };
-        let [displacements, velocities] = orbit.start.coordinates(&rig.host).unwrap();
-        let start = StructureState {
-            displacements,
-            velocities,
-            q2: orbit.start.q2,
-            dq2: orbit.start.dq2,
+        let start = &orbit.start;
+        let rest = vec![0.0; start.sections.len()];
+        let rest = StructureState {
+            displacements: rest.clone(),
+            velocities: rest,
+            q2: 0.0,
+            dq2: 0.0,
         };
         let drive = Drive::harmonic(orbit.drive, orbit.omega);
-        let mut plant = Plant::with_host(rig.host.clone(), parameters, &start).unwrap();
+        let mut plant = Plant::with_host(rig.host.clone(), parameters, &rest).unwrap();
         plant.begin(drive).unwrap();
+        plant.set_sections(&start.sections, [start.q2, start.dq2]).unwrap();
         let half = 0.5 * TAU / orbit.omega;
         let middle = (orbit.impact_phase / orbit.omega + 0.5 * half).rem_euclid(half);
         plant.advance(drive, middle).unwrap();

@@ -33,11 +33,6 @@ impl ImpactPattern {
         Self { walls: vec![1.0], half_periods: 1, mirrored: true }
     }
 
-    /// Two impacts per period, half a period apart.
-    pub fn is_symmetric(&self) -> bool {
-        self.mirrored && self.is_one_to_one()
-    }
-
     /// Two impacts per period.
     pub fn is_one_to_one(&self) -> bool {
         self.periods() == 1 && self.impacts() == 2
@@ -157,12 +152,6 @@ impl Impacts {
     pub(super) fn after(scene: &Dimensionless, sigma: f64, bounce: &Bounce) -> Option<Self> {
         let leaves = (bounce.dq1 - bounce.dq2) * bounce.wall < 0.0;
         Self::new(scene, sigma, bounce.phase, bounce.state()).filter(|_| leaves)
-    }
-
-    /// (q1, q1', q2, q2') after the time `t`.
-    pub(super) fn state(mut self, t: f64) -> Option<[f64; 4]> {
-        self.plant.advance(self.drive, t).ok()?;
-        Some(self.plant.state().into())
     }
 }
 

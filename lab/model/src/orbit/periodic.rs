@@ -139,34 +139,6 @@ impl Periodic {
     pub(crate) fn exponent(&self) -> f64 {
         2.0 * self.moduli()[3].ln() / f64::from(self.pattern.half_periods)
     }
-
-    /// (tau, q1, q1', q2, q2') at `points` equal steps over one period of the base, from a passage of the base through
-    /// zero, upwards; dimensionless. The impacts fall between the points.
-    pub fn motion(&self, scene: &Dimensionless, points: usize) -> Vec<[f64; 5]> {
-        let (scene, omega) = (Dimensionless { g: self.g, ..*scene }, 1.0 + scene.epsilon * self.sigma);
-        // The bounces of the whole period; a mirrored pattern's other half is minus the first.
-        let (half, mut bounces, mut period) = (self.pattern.turn(), self.bounces.clone(), self.pattern.turn());
-        if self.pattern.mirrored {
-            bounces.extend(self.bounces.iter().map(|bounce| Bounce {
-                phase: bounce.phase + half,
-                q1: -bounce.q1,
-                dq1: -bounce.dq1,
-                dq2: -bounce.dq2,
-                wall: -bounce.wall,
-            }));
-            period = 2.0 * half;
-        }
-        let at = |n: usize| {
-            let phase = TAU * n as f64 / points as f64;
-            let since = |bounce: &Bounce| (phase - bounce.phase).rem_euclid(period);
-            let last = bounces
-                .iter()
-                .min_by(|first, second| since(first).total_cmp(&since(second)))?;
-            let [q1, dq1, q2, dq2] = Impacts::after(&scene, self.sigma, last)?.state(since(last) / omega)?;
-            Some([phase / omega, q1, dq1, q2, dq2])
-        };
-        (0..points).filter_map(at).collect()
-    }
 }
 
 /// Largest distance of a settling motion from itself one repetition later, over b and b omega0, from which Newton's method starts.

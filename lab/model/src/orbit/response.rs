@@ -122,12 +122,6 @@ impl Search<'_> {
 }
 
 impl FrequencyResponse {
-    /// The components of symmetric 1:1 motions.
-    pub fn symmetric(&self) -> impl Iterator<Item = &Branch> {
-        let symmetric = |branch: &&Branch| branch.pattern().is_symmetric();
-        self.components.iter().map(|branch| &branch.branch).filter(symmetric)
-    }
-
     /// A motion of the scene lies on one of the components.
     pub fn contains(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
         self.components

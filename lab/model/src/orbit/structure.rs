@@ -9,7 +9,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use lovines::oscillator::Oscillator;
-use lovines::{Excitation, Host, InvalidHost, Section};
+use lovines::{Excitation, Host, Section};
 use nalgebra::{Complex, Matrix2, Vector2};
 use serde::Serialize;
 
@@ -61,22 +61,6 @@ pub struct StructureStart {
     pub q2: f64,
     /// Velocity of the particle, m/s.
     pub dq2: f64,
-}
-
-impl StructureStart {
-    /// Displacements and velocities of the coordinates of the host (its modes or degrees of freedom), to start a plant from.
-    pub fn coordinates(&self, host: &Host) -> Result<[Vec<f64>; 2], InvalidHost> {
-        let count = self.sections.len();
-        let point = |n: usize| {
-            let unit: Vec<f64> = (0..count).map(|other| f64::from(u8::from(other == n))).collect();
-            let parts = host.row(&unit)?.into_iter().zip(host.sections()).zip(&self.sections);
-            // The drive is 0 here.
-            let states = parts.map(|((pair, section), state)| section.at(pair, Vector2::from(*state)));
-            Ok(states.sum::<Vector2<f64>>())
-        };
-        let points = (0..count).map(point).collect::<Result<Vec<_>, InvalidHost>>()?;
-        Ok([0, 1].map(|part| points.iter().map(|point| point[part]).collect()))
-    }
 }
 
 impl StructureOrbit {
@@ -459,15 +443,6 @@ impl StructureOrbits {
         self.branches(range, roots, |motion, with_stability| {
             self.accept(motion, with_stability)
         })
-    }
-
-    /// What each section and, last, the particle contribute to the disturbance of an orbit that grows fastest or decays slowest: shares
-    /// of its energy.
-    ///
-    /// The disturbance is an eigenvector of the half-period map. The displacement of a section without a natural frequency, as the
-    /// particle is, counts as at the frequency of the orbit.
-    pub fn shares(&self, orbit: &StructureOrbit) -> Option<Vec<f64>> {
-        self.shares_of(orbit, *orbit.multipliers.last()?)
     }
 
     /// First-order theory of the section `n` alone; `None` unless it oscillates and the cavity and the drive reach it.
