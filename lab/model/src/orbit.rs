@@ -30,8 +30,8 @@ pub use plant::{NoMotion, PlantMotion, periodic_motion, resonant_motion, resonan
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, bifurcation_curves, response};
 pub use return_map::{Bifurcation, Condition, Unknowns};
 pub use structure::{
-    FirstOrder, ModeFacts, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
-    StructureOrbits, StructureRange, StructureStart,
+    ModeFacts, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit, StructureOrbits,
+    StructureRange, StructureStart,
 };
 pub use study::{
     at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone, stable_resonant,

@@ -1,4 +1,4 @@
-//! Return maps: the equations that close a periodic motion and select it, Newton's method, multipliers and bifurcations (docs/regimes.md, eq. 26).
+//! Return maps: the equations that close a periodic motion and select it, Newton's method, multipliers and bifurcations (docs/regimes.md, eq. 27).
 //!
 //! A motion starts in a section, an event or a phase of the base, and returns to it. The section has four coordinates; frequency and amplitude of the base
 //! are unknown as well, and two conditions select the motion.

@@ -2,7 +2,7 @@
 //!
 //! The plant's motion and its derivative are closed forms between events, exact to rounding. The first harmonic of the particle is integrated by Gauss's
 //! rule from event to event, where the motion is analytic. With it, the balance of momentum gives the harmonic of the primary mass:
-//! `(k - M omega² + i c omega) Q1 = (k + i c omega) E + m omega² Q2`.
+//! `(k - M omega² + i c omega) Q1 = (k + i c omega) E + m omega² Q2` (docs/regimes.md, eq. 26).
 
 use std::f64::consts::{PI, TAU};
 

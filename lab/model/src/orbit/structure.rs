@@ -75,13 +75,10 @@ impl StructureOrbit {
         // Half a period later the particle is at the opposite point.
         let [q2, dq2] = [-FRAC_PI_2 * self.speed / self.omega / d.b, d.speed(self.speed)];
         let impact_velocity = d.speed(self.impact_velocity);
-        let moduli = self.multipliers.iter().rev().map(|[re, im]| re.hypot(*im));
-        let mut multipliers = [f64::NAN; 4];
-        multipliers
-            .iter_mut()
-            .rev()
-            .zip(moduli)
-            .for_each(|(multiplier, modulus)| *multiplier = modulus);
+        let modulus = |n: usize| {
+            let [re, im] = self.multipliers.iter().rev().nth(n)?;
+            Some(re.hypot(*im))
+        };
         Orbit {
             g: d.excitation(self.reference * base_per_drive),
             sigma: d.sigma(self.omega),
@@ -97,7 +94,7 @@ impl StructureOrbit {
                 q2,
                 dq2,
             },
-            multipliers,
+            multipliers: [3, 2, 1, 0].map(|n| modulus(n).unwrap_or(f64::NAN)),
             stable: self.stable,
             neutral: self.neutral,
         }
@@ -263,17 +260,6 @@ pub struct StructureFacts {
     pub all: Vec<StructureBranch>,
 }
 
-/// First-order theory of one mode of a structure.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstOrder {
-    /// The dimensionless numbers of the mode alone, without a drive; its response is the displacement of the cavity.
-    pub numbers: Dimensionless,
-    /// Amplitude of the base, m, that drives the oscillator of these numbers as a unit drive does the mode.
-    pub base_per_drive: f64,
-    /// Amplitude of the response over the amplitude of the cavity.
-    pub response_per_cavity: f64,
-}
-
 /// The symmetric 1:1 orbits of a structure with a particle in a cavity.
 ///
 /// By default the response is the displacement of the cavity, and lags the drive by a quarter of a period at resonance.
@@ -409,8 +395,8 @@ impl StructureOrbits {
     /// Frequencies from `low` to `high`, equally spaced far from the modes, and ever closer towards each: the orbits of a mode with a small mass ratio
     /// epsilon are within some epsilon of its frequency.
     fn grid(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
-        let modes = (0..self.sections.len()).filter_map(|n| self.first_order(n));
-        let modes: Vec<_> = modes.map(|mode| (mode.numbers.omega0, mode.numbers.epsilon)).collect();
+        let modes = (0..self.sections.len()).filter_map(|n| self.numbers(n));
+        let modes: Vec<_> = modes.map(|mode| (mode.omega0, mode.epsilon)).collect();
         let next = move |omega: f64| {
             let distances = modes
                 .iter()
@@ -445,37 +431,28 @@ impl StructureOrbits {
         })
     }
 
-    /// First-order theory of the section `n` alone; `None` unless it oscillates and the cavity and the drive reach it.
-    pub fn first_order(&self, n: usize) -> Option<FirstOrder> {
+    /// The dimensionless numbers of the section `n` alone, without a drive; its response is the displacement of the cavity. `None` unless it oscillates
+    /// and the cavity and the drive reach it.
+    pub fn numbers(&self, n: usize) -> Option<Dimensionless> {
         let section = self.sections.get(n)?;
         let Particle { mass, half_width, restitution } = self.particle;
-        let Oscillator { delta, omega0, omega0_squared, .. } = section.oscillator;
+        let Oscillator { delta, omega0, .. } = section.oscillator;
         let epsilon = mass * section.velocity_per_impulse(section.cavity);
-        let [cavity, response] = [None, self.response.as_ref()].map(|rows| {
-            let row = rows.map_or(section.cavity, |rows| rows[n]);
-            harmonic(row, section.driven(omega0)).norm()
-        });
-        if !(delta < omega0 && epsilon > 0.0 && cavity > 0.0) {
-            return None;
-        }
+        let is_driven = harmonic(section.cavity, section.driven(omega0)).norm() > 0.0;
         let reference = match self.excitation {
             Excitation::Force => Reference::Force,
             Excitation::Base => Reference::Base,
         };
-        Some(FirstOrder {
-            numbers: Dimensionless {
-                omega0,
-                b: half_width,
-                definition: Definition {
-                    reference,
-                    sensor: Sensor::Q1,
-                    phase: self.target,
-                    ..Definition::default()
-                },
-                ..Dimensionless::new(epsilon, 2.0 * delta / (epsilon * omega0), restitution, 0.0)
+        (delta < omega0 && epsilon > 0.0 && is_driven).then(|| Dimensionless {
+            omega0,
+            b: half_width,
+            definition: Definition {
+                reference,
+                sensor: Sensor::Q1,
+                phase: self.target,
+                ..Definition::default()
             },
-            base_per_drive: cavity / omega0_squared.hypot(2.0 * delta * omega0),
-            response_per_cavity: response / cavity,
+            ..Dimensionless::new(epsilon, 2.0 * delta / (epsilon * omega0), restitution, 0.0)
         })
     }
 
@@ -515,7 +492,7 @@ impl StructureOrbits {
     /// beyond which symmetric motions are unstable.
     pub fn range(&self, driven: usize, points: usize) -> Option<StructureRange> {
         const FASTEST_PARTICLE: f64 = 1.5;
-        let Dimensionless { omega0, b, epsilon, lambda, r, definition, .. } = self.first_order(driven)?.numbers;
+        let Dimensionless { omega0, b, epsilon, lambda, r, definition, .. } = self.numbers(driven)?;
         let flow = SlowFlow::new(lambda, r);
         let detunings = equally_spaced(0.0, FASTEST_PARTICLE, FEWEST_FREQUENCIES)
             .map(|speed| flow.detuning_at(speed, definition.off_resonance()));
