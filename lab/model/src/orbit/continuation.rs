@@ -342,11 +342,12 @@ impl Curve<'_> {
             let is_on_circle = motion.on_circle(imaginary, CROSSING_DISTANCE);
             is_on_circle.then_some((beyond, BranchBifurcation { kind, motion }))
         };
-        let kinds = [
-            Bifurcation::Fold,
-            Bifurcation::flip(self.pattern.mirrored),
-            Bifurcation::NeimarkSacker,
-        ];
+        let flip = if self.pattern.mirrored {
+            Bifurcation::SymmetryBreaking
+        } else {
+            Bifurcation::PeriodDoubling
+        };
+        let kinds = [Bifurcation::Fold, flip, Bifurcation::NeimarkSacker];
         let mut found: Vec<_> = kinds.into_iter().filter_map(crossing).collect();
         found.sort_by(|first, second| first.0.total_cmp(&second.0));
         found.into_iter().map(|found| found.1).collect()

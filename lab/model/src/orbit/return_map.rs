@@ -122,15 +122,6 @@ impl Bifurcation {
         }
     }
 
-    /// The one at which a multiplier of a map is -1.
-    pub(super) fn flip(is_mirrored: bool) -> Self {
-        if is_mirrored {
-            Bifurcation::SymmetryBreaking
-        } else {
-            Bifurcation::PeriodDoubling
-        }
-    }
-
     /// Zero where the multipliers of a map are on the unit circle as the bifurcation says, and smooth also where multipliers meet.
     pub(super) fn test(self, map: &Matrix4<f64>) -> f64 {
         match self {

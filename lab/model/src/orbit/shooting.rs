@@ -180,29 +180,30 @@ impl Shooting<'_> {
         q2_by[4] += q2 / omega;
 
         let p = self.parameters;
-        let inertia = p.particle_mass * omega * omega;
-        let base = Complex::new(p.stiffness, p.damping * omega);
+        let (omega0, base, inertia) = (
+            p.natural_frequency(),
+            Complex::new(p.stiffness, p.damping * omega),
+            p.particle_mass * omega * omega,
+        );
         let stiffness = base - p.primary_mass * omega * omega;
-        let q1 = (base * amplitude + q2 * inertia) / stiffness;
-        let mut q1_by = q2_by.map(|by| by * inertia / stiffness);
-        let base_by = Complex::new(0.0, p.damping);
-        let stiffness_by = base_by - 2.0 * p.primary_mass * omega;
-        q1_by[4] += (base_by * amplitude + q2 * (2.0 * inertia / omega) - q1 * stiffness_by) / stiffness;
-        q1_by[5] += base / stiffness;
-
-        let omega0 = p.natural_frequency();
-        let over_omega0 = omega / omega0;
         let of_particle = match self.definition.sensor {
             Sensor::V => p.mass_ratio(),
             Sensor::Q1 => 0.0,
         };
-        let damping = p.damping / (p.primary_mass * omega0);
+        let (damping, over_omega0) = (p.damping / (p.primary_mass * omega0), omega / omega0);
         let reference = self.definition.reference;
         let turned = Complex::from_polar(1.0, -reference.phase(damping, over_omega0));
-        let read = |q1: Complex<f64>, q2: Complex<f64>| (q1 + q2 * of_particle) * turned;
-        let response = read(q1, q2);
-        let mut by: [_; 6] = std::array::from_fn(|n| read(q1_by[n], q2_by[n]));
-        by[4] -= response * Complex::i() * (reference.phase_slope(damping, over_omega0) / omega0);
+        // The response is linear in E and Q2.
+        let (by_amplitude, by_inertia) = (turned * base / stiffness, turned * inertia / stiffness);
+        let by_q2 = by_inertia + turned * of_particle;
+        let response = by_amplitude * amplitude + by_q2 * q2;
+        let mut by = q2_by.map(|by| by_q2 * by);
+        let base_rate = Complex::new(0.0, p.damping);
+        let stiffness_rate = (base_rate - 2.0 * p.primary_mass * omega) / stiffness;
+        by[4] += by_amplitude * amplitude * (base_rate / base - stiffness_rate)
+            + by_inertia * q2 * (-stiffness_rate + 2.0 / omega)
+            - response * Complex::i() * (reference.phase_slope(damping, over_omega0) / omega0);
+        by[5] += by_amplitude;
         (response, by)
     }
 }
