@@ -1,7 +1,8 @@
 //! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/regimes.md, eq. 27).
 //!
 //! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more selects the curve: fixed G for a frequency
-//! response, a multiplier on the unit circle for a curve of bifurcations. The step follows the tangent and shrinks where the curve bends. A branch ends where its pattern of impacts ends, at a graze.
+//! response, a multiplier on the unit circle for a curve of bifurcations. The step follows the tangent and shrinks where the curve bends. A branch
+//! ends where its pattern of impacts ends, at a graze.
 //!
 //! Each kind of bifurcation has a test function of the multipliers that is zero there, and smooth also where multipliers meet. A change of
 //! its sign shows a bifurcation; two of a kind within one step are missed.

@@ -1,11 +1,11 @@
 //! Motions by their impacts: patterns, and the return map of a pattern.
 //!
-//! The section is the state just after an impact: it moves along with a curve of motions, and the map has derivatives wherever the pattern stays the
-//! same. A disturbed motion reaches the wall a little earlier or later, which moves its state along the motion, and its phase. A start at another phase
-//! of the base is the same motion, begun earlier or later.
+//! The section is the state just after an impact: it moves along with a curve of motions, and the map has derivatives wherever the pattern stays
+//! the same. A disturbed motion reaches the wall a little earlier or later, which moves its state along the motion, and its phase. A start at
+//! another phase of the base is the same motion, begun earlier or later.
 
 use std::f64::consts::{PI, TAU};
-use std::ops::{ControlFlow, SubAssign};
+use std::ops::ControlFlow;
 
 use lovines::{Drive, Event, Parameters, Plant, State};
 use nalgebra::{Matrix6, RowVector6, Vector4, Vector6};
@@ -184,8 +184,8 @@ pub(super) struct ImpactSection<'a> {
 }
 
 impl ImpactSection<'_> {
-    /// The return from the unknowns `x`, and `bounce` of each state after an impact, from the start to the last before the return, with the time of flight
-    /// after it. None if the impacts have another pattern or graze.
+    /// The return from the unknowns `x`, and `bounce` of each state after an impact, from the start to the last before the return, with the time
+    /// of flight after it. None if the impacts have another pattern or graze.
     pub(super) fn follow(&self, x: &Unknowns, mut bounce: impl FnMut(Bounce, f64)) -> Option<Return> {
         let [phase, q1, dq1, dq2, sigma, g] = (*x).into();
         let (pattern, scene) = (self.pattern, Dimensionless { g, ..*self.scene });
@@ -226,13 +226,15 @@ impl ReturnMap for ImpactSection<'_> {
     }
 }
 
-/// Derivative of (phase, q1, q1', q2') after the impact that was passed last, and of both parts of the harmonic, by (phase, q1, q1', q2') at the start,
-/// frequency and amplitude. `begun` are the rates at the start.
+/// Derivative of (phase, q1, q1', q2') after the impact that was passed last, and of both parts of the harmonic, by (phase, q1, q1', q2') at the
+/// start, frequency and amplitude. `begun` are the rates at the start.
 fn at_impact(shot: &Shot, begun: &Vector6<f64>, omega: f64) -> Matrix6<f64> {
     let (by, rates) = (shot.derivatives(), shot.rates());
     let mut earlier = rates - by.fixed_columns::<4>(0) * begun.fixed_rows::<4>(0);
     // An integral also loses its beginning.
-    earlier.fixed_rows_mut::<2>(4).sub_assign(begun.fixed_rows::<2>(4));
+    for row in [4, 5] {
+        earlier[row] -= begun[row];
+    }
     let mut fixed = Matrix6::from_columns(&[
         earlier / omega,
         by.column(0) + by.column(2),

@@ -1,7 +1,7 @@
 //! Periodic motions of the plant itself, with all effects of its cavity: the return map of a number of periods of the base.
 //!
-//! The section is the phase of the base in the middle of the longest flight. Events stay away from it, and all four coordinates are free there, also where the particle
-//! sticks later: the map then loses rank, but the map minus the identity does not.
+//! The section is the phase of the base in the middle of the longest flight. Events stay away from it, and all four coordinates are free there,
+//! also where the particle sticks later: the map then loses rank, but the map minus the identity does not.
 
 use std::f64::consts::TAU;
 

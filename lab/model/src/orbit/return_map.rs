@@ -1,7 +1,7 @@
 //! Return maps: the equations that close a periodic motion and select it, Newton's method, multipliers and bifurcations (docs/regimes.md, eq. 27).
 //!
-//! A motion starts in a section, an event or a phase of the base, and returns to it. The section has four coordinates; frequency and amplitude of the base
-//! are unknown as well, and two conditions select the motion.
+//! A motion starts in a section, an event or a phase of the base, and returns to it. The section has four coordinates; frequency and amplitude of
+//! the base are unknown as well, and two conditions select the motion.
 
 use nalgebra::{Complex, Matrix4, Matrix4x6, Matrix6, RowVector6, Vector4, Vector6};
 use serde::Serialize;
@@ -70,8 +70,8 @@ pub enum Condition {
     Excitation(f64),
     /// The first harmonic of the response has this phase, rad, relative to the reference, or the opposite one.
     Phase(f64),
-    /// The part C of the first harmonic that has the phase `phase`, rad, and sigma lie on a line: the place of a curve that crosses it, also where amplitude
-    /// or frequency have an extremum.
+    /// The part C of the first harmonic that has the phase `phase`, rad, and sigma lie on a line: the place of a curve that crosses it, also where
+    /// amplitude or frequency have an extremum.
     Across {
         /// The phase.
         phase: f64,

@@ -1,7 +1,7 @@
-//! Shooting: a motion of the plant from a start on, with the derivatives of its state and of its first harmonic by start and drive ([`Variation`]).
+//! Shooting: a motion of the plant from a start on, with the derivatives of its state and of its first harmonic by start and drive.
 //!
-//! The plant's motion and its derivative are closed forms between events, exact to rounding. The first harmonic of the particle is integrated by Gauss's
-//! rule from event to event, where the motion is analytic. With it, the balance of momentum gives the harmonic of the primary mass:
+//! The plant's motion and its derivative ([`Variation`]) are closed forms between events, exact to rounding. The first harmonic of the particle is
+//! integrated by Gauss's rule from event to event, where the motion is analytic. The balance of momentum gives the one of the primary mass:
 //! `(k - M omega² + i c omega) Q1 = (k + i c omega) E + m omega² Q2` (docs/regimes.md, eq. 26).
 
 use std::f64::consts::{PI, TAU};
@@ -90,7 +90,7 @@ impl Shot {
         Complex::from_polar(size, -(self.phase + self.omega * since))
     }
 
-    /// Adds a stretch without events.
+    /// Adds the integral over a time without events.
     fn integrate(&mut self, duration: f64) {
         let from = self.variation;
         let pieces = (self.omega * duration / PI).ceil().max(1.0);
@@ -141,8 +141,8 @@ pub(super) struct Shooting<'a> {
 }
 
 impl Shooting<'_> {
-    /// The return after the angle `turn` of the base: how far the section is apart, and from the derivatives of its four coordinates and of both parts of the
-    /// harmonic by the coordinates, the frequency and the amplitude.
+    /// The return after the angle `turn` of the base, rad. `by`: the derivatives of the four coordinates at the end and of both parts of the harmonic,
+    /// by the coordinates at the start, frequency and amplitude.
     pub(super) fn returned(
         &self,
         drive: &Drive,
@@ -164,7 +164,7 @@ impl Shooting<'_> {
         }
     }
 
-    /// First harmonic of the response relative to the reference, and its derivatives by the coordinates at the section, the frequency and the amplitude.
+    /// First harmonic of the response relative to the reference, and its derivatives by the coordinates at the start, frequency and amplitude.
     fn response(
         &self,
         drive: &Drive,

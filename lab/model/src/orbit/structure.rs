@@ -431,8 +431,8 @@ impl StructureOrbits {
         })
     }
 
-    /// The dimensionless numbers of the section `n` alone, without a drive; its response is the displacement of the cavity. `None` unless it oscillates
-    /// and the cavity and the drive reach it.
+    /// The dimensionless numbers of the section `n` alone, without a drive; its response is the displacement of the cavity. `None` unless it
+    /// oscillates and the cavity and the drive reach it.
     pub fn numbers(&self, n: usize) -> Option<Dimensionless> {
         let section = self.sections.get(n)?;
         let Particle { mass, half_width, restitution } = self.particle;
