@@ -28,7 +28,7 @@ pub use periodic::{Periodic, settle};
 pub(crate) use periodic::{SETTLING_DISTANCE, periodic_near};
 pub use plant::{NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion};
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, bifurcation_curves, response};
-pub use return_map::{Bifurcation, Condition, Unknowns};
+pub use return_map::{Bifurcation, Condition, Stability, Unknowns};
 pub use structure::{
     ModeFacts, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit, StructureOrbits,
     StructureRange, StructureStart,

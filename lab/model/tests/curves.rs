@@ -77,7 +77,7 @@ fn checked(scene: &Dimensionless) -> FrequencyResponse {
             .filter(|one| one.kind == Bifurcation::NeimarkSacker && one.motion.bounds_stability())
         {
             let near = |motion: &Periodic| (motion.sigma - torus.motion.sigma).abs() < 0.1;
-            assert!(points.iter().any(|one| near(one) && one.stable), "{name}");
+            assert!(points.iter().any(|one| near(one) && one.stability.stable), "{name}");
         }
 
         let place = |one: &Periodic| {
@@ -159,7 +159,7 @@ fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
         };
         let other = usize::from(!motion.pattern.is_one_to_one());
         counts[other] += 1;
-        counts[2 + other] += usize::from(motion.stable && !found.contains(scene, &motion));
+        counts[2 + other] += usize::from(motion.stability.stable && !found.contains(scene, &motion));
     }
     counts
 }
@@ -194,7 +194,12 @@ fn off_circle(kind: Bifurcation, motion: &Periodic) -> f64 {
         Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (re + 1.0).hypot(*im),
         Bifurcation::NeimarkSacker => (re.hypot(*im) - 1.0).abs(),
     };
-    motion.multipliers.iter().map(distance).fold(f64::MAX, f64::min)
+    motion
+        .stability
+        .multipliers
+        .iter()
+        .map(distance)
+        .fold(f64::MAX, f64::min)
 }
 
 /// The bifurcations of the 1:1 motions at one excitation.

@@ -263,7 +263,7 @@ fn eigenvector(matrix: &DMatrix<f64>, value: Complex<f64>) -> DVector<Complex<f6
 /// Relative errors of the rate of growth: by the derivative of the plant's motion, and of a disturbed plant that leaves the orbit; `None` if the
 /// disturbance grows by less than e in all periods.
 fn rates(rig: &Rig, orbit: &StructureOrbit) -> Option<[f64; 2]> {
-    let expected = 2.0 * orbit.growth().ln();
+    let expected = 2.0 * orbit.stability.growth().ln();
     if expected * (PERIODS as f64) < 1.0 {
         return None;
     }
@@ -335,7 +335,7 @@ fn random_structures_stay_on_stable_orbits_and_leave_unstable_ones_at_the_rate_o
         let inside = branches
             .iter()
             .flat_map(|branch| branch.orbits.iter().skip(1).rev().skip(1));
-        let (settled, lost): (Vec<_>, Vec<_>) = inside.partition(|orbit| orbit.stable);
+        let (settled, lost): (Vec<_>, Vec<_>) = inside.partition(|orbit| orbit.stability.stable);
         if settled.is_empty() && lost.is_empty() {
             continue;
         }
@@ -410,9 +410,10 @@ fn no_symmetric_motion_that_a_plant_settles_on_is_missing_from_the_orbits_of_its
         let speed = motion.plant.state().dq2.abs();
         let found = rig.orbits.at(beside.omega, beside.drive);
         // What is left to settle is the last change over the rate of decay.
-        let is_near =
-            |orbit: &StructureOrbit| (orbit.speed / speed - 1.0).abs() < 1e-9 + 10.0 * left / (1.0 - orbit.growth());
-        let is_found = found.iter().any(|orbit| orbit.stable && is_near(orbit));
+        let is_near = |orbit: &StructureOrbit| {
+            (orbit.speed / speed - 1.0).abs() < 1e-9 + 10.0 * left / (1.0 - orbit.stability.growth())
+        };
+        let is_found = found.iter().any(|orbit| orbit.stability.stable && is_near(orbit));
         assert!(
             is_found,
             "{} at {} rad/s: {speed} m/s {left:e}, {found:?}",

@@ -64,7 +64,7 @@ fn figures(orbit: &StructureOrbit) -> [f64; 4] {
         orbit.speed / (b * omega0()),
         orbit.response / b,
         orbit.drive,
-        orbit.growth(),
+        orbit.stability.growth(),
     ]
 }
 
@@ -86,7 +86,7 @@ fn orbits_of_one_and_two_modes_have_the_figures_of_an_independent_computation() 
 #[test]
 fn a_second_mode_takes_the_stability_and_its_damping_gives_some_of_it_back() {
     let unstable = two_modes(6.27, 1.0);
-    assert!(right(&unstable, 0.990).is_unstable());
+    assert!(right(&unstable, 0.990).stability.is_unstable());
     let backbone = unstable.backbone(&unstable.range(0, 200).unwrap());
     let mut changes = backbone.iter().flat_map(|branch| &branch.changes);
     assert!(
@@ -95,8 +95,8 @@ fn a_second_mode_takes_the_stability_and_its_damping_gives_some_of_it_back() {
     );
 
     let damped = two_modes(6.27, 3.0);
-    assert!(right(&damped, 0.990).stable);
-    let growth = right(&damped, 0.9915).growth();
+    assert!(right(&damped, 0.990).stability.stable);
+    let growth = right(&damped, 0.9915).stability.growth();
     assert!((growth - 1.02).abs() < 0.005, "{growth}");
     let influences = [6.27, 2.97].map(|ratio| two_modes(ratio, 1.0).modes(0).unwrap()[1].influence);
     assert!(influences[0] < 0.002 && influences[1] > 0.04, "{influences:?}");
@@ -112,11 +112,13 @@ fn changes(branches: &[StructureBranch]) -> (Vec<Change>, Vec<[f64; 2]>) {
         .iter()
         .flat_map(|branch| &branch.changes)
         .filter(|change| fast(&change.orbit));
-    let stretches = branches
-        .iter()
-        .flat_map(|branch| branch.orbits.chunk_by(|one, other| one.stable == other.stable));
+    let stretches = branches.iter().flat_map(|branch| {
+        branch
+            .orbits
+            .chunk_by(|one, other| one.stability.stable == other.stability.stable)
+    });
     let ends = |stretch: &[StructureOrbit]| [0, stretch.len() - 1].map(|n| stretch[n].omega / omega0());
-    let stable = stretches.filter(|stretch| stretch[0].stable && fast(&stretch[0]));
+    let stable = stretches.filter(|stretch| stretch[0].stability.stable && fast(&stretch[0]));
     (
         changes.map(|change| (change.kind, change.section())).collect(),
         stable.map(ends).collect(),
@@ -183,6 +185,7 @@ fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_
         ]);
     }
     let moduli = found
+        .stability
         .multipliers
         .iter()
         .map(|[re, im]| re.hypot(*im))
@@ -200,7 +203,7 @@ fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
     let mut compare = |found: Vec<StructureOrbit>, expected: Vec<Orbit>, scene: &Dimensionless, per_drive: f64| {
         assert_eq!(found.len(), expected.len());
         for (one, other) in found.iter().zip(&expected) {
-            assert_eq!(one.stable, other.stable);
+            assert_eq!(one.stability.stable, other.stable);
             worst = worst.max(apart(one, scene, other, per_drive));
         }
         found.len()
@@ -268,7 +271,13 @@ fn a_backbone_is_smooth_at_phase_resonance_and_changes_its_stability_where_a_mul
             }
             for change in &branch.changes {
                 let distance = |[re, im]: &[f64; 2]| (re.hypot(*im) - 1.0).abs();
-                let nearest = change.orbit.multipliers.iter().map(distance).fold(f64::MAX, f64::min);
+                let nearest = change
+                    .orbit
+                    .stability
+                    .multipliers
+                    .iter()
+                    .map(distance)
+                    .fold(f64::MAX, f64::min);
                 assert!(nearest < 1e-6, "{:?} {nearest:e}", change.kind);
                 kinds.push(change.kind);
             }

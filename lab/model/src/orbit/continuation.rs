@@ -12,7 +12,7 @@ use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 use super::impacts::{Bounce, ImpactPattern, ImpactSection};
 use super::periodic::{Periodic, wrapped};
-use super::return_map::{Bifurcation, Condition, Unknowns};
+use super::return_map::{Bifurcation, Condition, Stability, Unknowns};
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
 
@@ -87,7 +87,7 @@ const DRAWN: f64 = 1e-4;
 
 /// A motion of a branch as it is serialised; the impacts follow from the first one.
 #[derive(Serialize)]
-struct DrawnMotion {
+struct DrawnMotion<'a> {
     #[serde(rename = "G")]
     g: f64,
     sigma: f64,
@@ -96,28 +96,25 @@ struct DrawnMotion {
     gamma: f64,
     #[serde(rename = "B")]
     b: f64,
-    multipliers: [[f64; 2]; 4],
-    stable: bool,
-    neutral: bool,
+    #[serde(flatten)]
+    stability: &'a Stability,
     start: Bounce,
 }
 
 impl Serialize for Branch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let drawn = |motion: &Periodic| {
-            let Periodic { g, sigma, c, gamma, b, multipliers, stable, neutral, .. } = *motion;
+        fn drawn(motion: &Periodic) -> DrawnMotion<'_> {
+            let Periodic { g, sigma, c, gamma, b, .. } = *motion;
             DrawnMotion {
                 g,
                 sigma,
                 c,
                 gamma,
                 b,
-                multipliers,
-                stable,
-                neutral,
+                stability: &motion.stability,
                 start: motion.bounces[0],
             }
-        };
+        }
         let points: Vec<DrawnMotion> = self.drawn().into_iter().map(drawn).collect();
         let mut fields = serializer.serialize_struct("Branch", 4)?;
         fields.serialize_field("shape", self.pattern())?;
@@ -134,7 +131,7 @@ impl Branch {
         let points = &self.points;
         let (mut drawn, mut from) = (vec![&points[0]], 0);
         for to in 1..points.len() {
-            let kind = |n: usize| [points[n].stable, points[n].neutral];
+            let kind = |n: usize| [points[n].stability.stable, points[n].stability.neutral];
             let changes = |n: usize| kind(n) != kind(n - 1);
             let is_off = |n: usize| off(&points[n], [&points[from], &points[to]]) > DRAWN;
             let ends = changes(to) || to > 1 && changes(to - 1);
@@ -150,7 +147,8 @@ impl Branch {
     /// Its motions are not 1:1, and the last ones are unstable.
     fn winds(&self) -> bool {
         let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
-        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(Periodic::is_unstable))
+        !self.pattern().is_one_to_one()
+            && last.is_some_and(|last| last.iter().all(|motion| motion.stability.is_unstable()))
     }
 }
 
@@ -268,7 +266,7 @@ impl Curve<'_> {
             return Some(BranchEnd::Joins);
         }
         match self.condition {
-            Condition::Bifurcation(Bifurcation::NeimarkSacker) if !next.on_circle(1e-3, 1e-6) => {
+            Condition::Bifurcation(Bifurcation::NeimarkSacker) if !next.stability.on_circle(1e-3, 1e-6) => {
                 return Some(BranchEnd::Resonance);
             }
             Condition::Bifurcation(_) => {}
@@ -302,7 +300,7 @@ impl Curve<'_> {
             return Some(BranchEnd::Range);
         }
         if branch.winds() {
-            let stable = branch.points.iter().rposition(|motion| !motion.is_unstable());
+            let stable = branch.points.iter().rposition(|motion| !motion.stability.is_unstable());
             branch.points.truncate(stable.unwrap_or(0) + 2);
             return Some(BranchEnd::Unstable);
         }
@@ -340,7 +338,7 @@ impl Curve<'_> {
             } else {
                 0.0
             };
-            let is_on_circle = motion.on_circle(imaginary, CROSSING_DISTANCE);
+            let is_on_circle = motion.stability.on_circle(imaginary, CROSSING_DISTANCE);
             is_on_circle.then_some((beyond, BranchBifurcation { kind, motion }))
         };
         let flip = if self.pattern.mirrored {

@@ -7,7 +7,7 @@ use nalgebra::{SVector, Vector4};
 use serde::Serialize;
 
 use super::impacts::{Bounce, ImpactPattern, ImpactSection, Impacts};
-use super::return_map::{Closing, Condition, Return, Unknowns, stability};
+use super::return_map::{Closing, Condition, Return, Stability, Unknowns};
 use crate::Dimensionless;
 
 /// A phase in (-pi, pi].
@@ -36,12 +36,9 @@ pub struct Periodic {
     pub pattern: ImpactPattern,
     /// The states just after the impacts of the map.
     pub bounces: Vec<Bounce>,
-    /// Multipliers (real, imaginary) of the map, by rising modulus; a mirrored pattern has a map of half of its period.
-    pub multipliers: [[f64; 2]; 4],
-    /// All of them are inside the unit circle.
-    pub stable: bool,
-    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
-    pub neutral: bool,
+    /// Of the map; a mirrored pattern has a map of half of its period.
+    #[serde(flatten)]
+    pub stability: Stability,
     /// The map with its derivatives.
     #[serde(skip)]
     pub(super) map: Return,
@@ -69,8 +66,6 @@ impl Periodic {
             duration += time;
             travelled += bounce.dq2.abs() * time;
         })?;
-        let multipliers = map.multipliers();
-        let [stable, neutral] = stability(multipliers[3].norm());
         Some(Self {
             g: x[5],
             sigma: x[4],
@@ -79,16 +74,9 @@ impl Periodic {
             b: travelled / duration,
             pattern: pattern.clone(),
             bounces,
-            multipliers: multipliers.map(|multiplier| [multiplier.re, multiplier.im]),
-            stable,
-            neutral,
+            stability: map.stability(),
             map,
         })
-    }
-
-    /// Whether a multiplier is outside the unit circle.
-    pub fn is_unstable(&self) -> bool {
-        !self.stable && !self.neutral
     }
 
     /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
@@ -119,25 +107,14 @@ impl Periodic {
         (self.invariants() - other.invariants()).norm()
     }
 
-    /// A multiplier whose imaginary part has at least the size `imaginary` is within `distance` of the unit circle.
-    pub(super) fn on_circle(&self, imaginary: f64, distance: f64) -> bool {
-        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() >= imaginary);
-        pairs.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < distance)
-    }
-
     /// No multiplier is outside the unit circle, except for those that a bifurcation places on it.
     pub fn bounds_stability(&self) -> bool {
-        self.moduli()[3] < 1.0 + 1e-5
-    }
-
-    /// Moduli of the multipliers, ascending.
-    pub fn moduli(&self) -> [f64; 4] {
-        self.multipliers.map(|[re, im]| re.hypot(im))
+        self.stability.growth() < 1.0 + 1e-5
     }
 
     /// Largest Lyapunov exponent per period of the base.
     pub(crate) fn exponent(&self) -> f64 {
-        2.0 * self.moduli()[3].ln() / f64::from(self.pattern.half_periods)
+        2.0 * self.stability.growth().ln() / f64::from(self.pattern.half_periods)
     }
 }
 
@@ -164,7 +141,7 @@ pub fn settle(
         plant.advance(drive, TAU / drive.omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
-    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| !motion.is_unstable()))
+    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| !motion.stability.is_unstable()))
 }
 
 /// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at phase 0 of the base; one
@@ -181,7 +158,7 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
         .find_map(|pattern| {
             let found = Periodic::find(scene, &pattern, &guess, conditions)?;
             let close = (found.unknowns() - guess).norm() < 10.0 * SETTLING_DISTANCE;
-            if close && found.is_unstable() {
+            if close && found.stability.is_unstable() {
                 unstable.get_or_insert(found);
                 return None;
             }

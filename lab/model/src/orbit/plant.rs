@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::Orbit;
 use super::periodic::SETTLING_DISTANCE;
-use super::return_map::{Closing, Condition, Return, ReturnMap, Unknowns, stability};
+use super::return_map::{Closing, Condition, Return, ReturnMap, Stability, Unknowns};
 use super::shooting::{Shooting, Shot, plant_at};
 use super::study::{at_amplitude, at_speed, stable_resonant};
 use crate::numerics::Equations;
@@ -32,8 +32,8 @@ pub struct PlantMotion {
     pub periods: u32,
     /// First harmonic S of the response relative to the reference, m: the response has the part `Im(S exp(i phase))`.
     pub response: Complex<f64>,
-    /// Floquet multipliers over the whole motion, by rising modulus.
-    pub multipliers: [Complex<f64>; 4],
+    /// By the multipliers over the whole motion.
+    pub stability: Stability,
     /// Impacts over the whole motion.
     pub impacts: usize,
     /// How often the particle comes to rest on a wall, over the whole motion.
@@ -42,23 +42,6 @@ pub struct PlantMotion {
     pub sticks: usize,
     /// All events with the phase of the base, rad, from 0 to 2 pi times `periods`.
     pub events: Vec<(f64, Event)>,
-}
-
-impl PlantMotion {
-    /// Whether all multipliers are inside the unit circle.
-    pub fn is_stable(&self) -> bool {
-        stability(self.growth())[0]
-    }
-
-    /// Whether the largest multipliers are on the unit circle, within 1e-7: disturbances neither grow nor decay.
-    pub fn is_neutral(&self) -> bool {
-        stability(self.growth())[1]
-    }
-
-    /// Modulus of the largest multiplier.
-    fn growth(&self) -> f64 {
-        self.multipliers[3].norm()
-    }
 }
 
 /// Why no periodic motion was found.
@@ -112,13 +95,19 @@ pub fn resonant_motion(
         |scene: &Dimensionless| at_speed(scene, 0.5 * (Manifold::new(scene.r).b_min() + B_SYMMETRY_BREAKING));
     let ideal = Ideal::of(parameters, definition, of_response).ok_or(NoMotion::NoIdealMotion(response))?;
     let motion = Ideal { c, ..ideal }.continued(parameters, definition, Some(c));
-    if motion.as_ref().is_ok_and(PlantMotion::is_stable) {
+    if motion.as_ref().is_ok_and(|motion| motion.stability.stable) {
         return motion;
     }
     let detour =
         Ideal::of(parameters, definition, in_the_middle).map(|ideal| ideal.continued(parameters, definition, Some(c)));
     match detour {
-        Some(Ok(again)) if motion.as_ref().is_ok_and(|motion| motion.growth() <= again.growth()) => motion,
+        Some(Ok(again))
+            if motion
+                .as_ref()
+                .is_ok_and(|motion| motion.stability.growth() <= again.stability.growth()) =>
+        {
+            motion
+        }
         Some(Ok(again)) => Ok(again),
         _ => motion,
     }
@@ -179,7 +168,7 @@ pub fn settled_motion(
         if (here(&plant.state()) - at).amax() < SETTLING_DISTANCE {
             match PhaseSection::new(parameters, definition, periods)?.solve(0.0, at, conditions) {
                 // A particle that only slides may slide anywhere: one multiplier is 1.
-                Ok(Solution { motion, .. }) if motion.growth() < 1.0 + NEUTRAL => return Ok(Some(motion)),
+                Ok(Solution { motion, .. }) if motion.stability.growth() < 1.0 + NEUTRAL => return Ok(Some(motion)),
                 Ok(_) | Err(NoMotion::NotConverged) => {}
                 Err(error) => return Err(error),
             }
@@ -436,7 +425,7 @@ impl<'a> PhaseSection<'a> {
             amplitude,
             periods: self.periods,
             response: returned.response * self.numbers.b,
-            multipliers: returned.multipliers(),
+            stability: returned.stability(),
             impacts: count(|event| matches!(event, Event::Impact { .. })),
             rests: count(|event| matches!(event, Event::Stuck { .. })),
             sticks: count(|event| matches!(event, Event::Sticking { .. })),

@@ -138,7 +138,11 @@ impl Branch {
 
     /// The middle motion of all, and the middle one of the motions that are not unstable: a branch that contains both contains this branch.
     fn typical(&self) -> impl Iterator<Item = &Periodic> {
-        let stable: Vec<&Periodic> = self.points.iter().filter(|motion| !motion.is_unstable()).collect();
+        let stable: Vec<&Periodic> = self
+            .points
+            .iter()
+            .filter(|motion| !motion.stability.is_unstable())
+            .collect();
         let middle = stable.get(stable.len() / 2).copied();
         [self.points.get(self.points.len() / 2), middle].into_iter().flatten()
     }

@@ -45,20 +45,68 @@ impl Return {
         self.by.fixed_columns::<4>(0).into()
     }
 
-    /// The multipliers, by rising modulus.
-    pub(super) fn multipliers(&self) -> [Complex<f64>; 4] {
-        let mut multipliers: [Complex<f64>; 4] = self.monodromy().complex_eigenvalues().into();
-        multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
-        multipliers
+    pub(super) fn stability(&self) -> Stability {
+        Stability::of(self.monodromy().complex_eigenvalues().as_slice())
     }
 }
 
-/// Distance from the unit circle up to which a multiplier counts as on it: of a double one, rounding leaves half of the digits.
-pub(super) const ON_CIRCLE: f64 = 1e-7;
+/// How disturbances of a motion develop.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Stability {
+    /// Multipliers (real, imaginary) of the map, by rising modulus. The map of a mirrored motion covers half of its period.
+    pub multipliers: Vec<[f64; 2]>,
+    /// All of them are inside the unit circle.
+    pub stable: bool,
+    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
+    pub neutral: bool,
+}
 
-/// Whether a motion whose largest multiplier has this modulus is stable, and whether it is neutral.
-pub(super) fn stability(largest: f64) -> [bool; 2] {
-    [largest < 1.0 - ON_CIRCLE, (largest - 1.0).abs() <= ON_CIRCLE]
+/// Distance from the unit circle up to which a multiplier counts as on it: of a double one, rounding leaves half of the digits.
+const ON_CIRCLE: f64 = 1e-7;
+
+fn modulus([re, im]: &[f64; 2]) -> f64 {
+    re.hypot(*im)
+}
+
+impl Stability {
+    /// By the multipliers in any order.
+    pub(super) fn of(multipliers: &[Complex<f64>]) -> Self {
+        let mut sorted = multipliers.to_vec();
+        sorted.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
+        let largest = sorted.last().map_or(f64::NAN, |largest| largest.norm());
+        Self {
+            multipliers: sorted.iter().map(|one| [one.re, one.im]).collect(),
+            stable: largest < 1.0 - ON_CIRCLE,
+            neutral: (largest - 1.0).abs() <= ON_CIRCLE,
+        }
+    }
+
+    /// Whether a multiplier is outside the unit circle.
+    pub fn is_unstable(&self) -> bool {
+        !self.stable && !self.neutral
+    }
+
+    /// Modulus of the largest multiplier.
+    pub fn growth(&self) -> f64 {
+        self.multipliers.last().map_or(f64::NAN, modulus)
+    }
+
+    /// Number of multipliers outside the unit circle.
+    pub(super) fn outside(&self) -> usize {
+        let outside = |one: &&[f64; 2]| modulus(one) > 1.0 + ON_CIRCLE;
+        self.multipliers.iter().filter(outside).count()
+    }
+
+    /// Moduli of the four largest multipliers, ascending; NaN where there are fewer.
+    pub(super) fn largest_four(&self) -> [f64; 4] {
+        [3, 2, 1, 0].map(|n| self.multipliers.iter().rev().nth(n).map_or(f64::NAN, modulus))
+    }
+
+    /// A multiplier whose imaginary part has at least the size `imaginary` is within `distance` of the unit circle.
+    pub(super) fn on_circle(&self, imaginary: f64, distance: f64) -> bool {
+        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() >= imaginary);
+        pairs.any(|one| (modulus(one) - 1.0).abs() < distance)
+    }
 }
 
 /// An equation that selects a motion, in addition to the four that close it.

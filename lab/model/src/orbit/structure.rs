@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::half_period::HalfPeriod;
 use super::periodic::wrapped;
-use super::return_map::{Bifurcation, ON_CIRCLE, stability};
+use super::return_map::{Bifurcation, Stability};
 use super::symmetric::{Interval, Particle, Reading, SymmetricMotion, SymmetricMotions, harmonic, intervals, search};
 use super::{AfterImpact, Orbit};
 use crate::numerics::{self, Equations, equally_spaced, newton, try_bisection};
@@ -44,12 +44,9 @@ pub struct StructureOrbit {
     pub impact_phase: f64,
     /// Where the orbit can be started.
     pub start: StructureStart,
-    /// Multipliers (real, imaginary) of the half-period map by rising modulus: two of every section, and two of the particle.
-    pub multipliers: Vec<[f64; 2]>,
-    /// All of them are inside the unit circle.
-    pub stable: bool,
-    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
-    pub neutral: bool,
+    /// By the half-period map, which has two multipliers of every section, and two of the particle.
+    #[serde(flatten)]
+    pub stability: Stability,
 }
 
 /// The state where the phase of the drive is 0, so that the drive is `sin(omega t)` times its amplitude from there on.
@@ -64,21 +61,12 @@ pub struct StructureStart {
 }
 
 impl StructureOrbit {
-    /// Modulus of the largest multiplier of half a period.
-    pub fn growth(&self) -> f64 {
-        self.multipliers.last().map_or(f64::NAN, |[re, im]| re.hypot(*im))
-    }
-
     /// This orbit in the numbers of an oscillator, which a base of the amplitude `base_per_drive`, m, drives as a unit drive does the host, and
     /// whose response is this one over `reading_per_response`. Of the multipliers the four largest.
     pub fn in_numbers(&self, d: &Dimensionless, base_per_drive: f64, reading_per_response: f64) -> Orbit {
         // Half a period later the particle is at the opposite point.
         let [q2, dq2] = [-FRAC_PI_2 * self.speed / self.omega / d.b, d.speed(self.speed)];
         let impact_velocity = d.speed(self.impact_velocity);
-        let modulus = |n: usize| {
-            let [re, im] = self.multipliers.iter().rev().nth(n)?;
-            Some(re.hypot(*im))
-        };
         Orbit {
             g: d.excitation(self.reference * base_per_drive),
             sigma: d.sigma(self.omega),
@@ -94,21 +82,10 @@ impl StructureOrbit {
                 q2,
                 dq2,
             },
-            multipliers: [3, 2, 1, 0].map(|n| modulus(n).unwrap_or(f64::NAN)),
-            stable: self.stable,
-            neutral: self.neutral,
+            multipliers: self.stability.largest_four(),
+            stable: self.stability.stable,
+            neutral: self.stability.neutral,
         }
-    }
-
-    /// Whether a multiplier is outside the unit circle.
-    pub fn is_unstable(&self) -> bool {
-        !self.stable && !self.neutral
-    }
-
-    /// Number of multipliers outside the unit circle.
-    fn unstable(&self) -> usize {
-        let outside = |[re, im]: &&[f64; 2]| re.hypot(*im) > 1.0 + ON_CIRCLE;
-        self.multipliers.iter().filter(outside).count()
     }
 }
 
@@ -138,19 +115,19 @@ impl StructureBranch {
     /// The stretches of stable orbits, and of neutral ones, each with the changes at its ends; `None` where the curve ends.
     pub fn stretches(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
         let mut from = 0;
-        let kind = |orbit: &StructureOrbit| [orbit.stable, orbit.neutral];
+        let kind = |orbit: &StructureOrbit| [orbit.stability.stable, orbit.stability.neutral];
         let runs = self.orbits.chunk_by(move |one, other| kind(one) == kind(other));
         let with_ends = runs.map(move |run| {
             let ends = [from, from + run.len()].map(|n| self.changes.iter().find(|change| change.after + 1 == n));
             from += run.len();
             (run, ends)
         });
-        with_ends.filter(|(run, _)| !run[0].is_unstable())
+        with_ends.filter(|(run, _)| !run[0].stability.is_unstable())
     }
 
     /// The stretches of stable orbits.
     pub fn stable(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
-        self.stretches().filter(|(run, _)| run[0].stable)
+        self.stretches().filter(|(run, _)| run[0].stability.stable)
     }
 
     /// The stretches of stable orbits, with the orbits where they begin and end.
@@ -567,9 +544,7 @@ impl StructureOrbits {
             impact_velocity: motion.impact_velocity,
             impact_phase: motion.drive.arg(),
             start: StructureStart { sections: Vec::new(), q2: f64::NAN, dq2: f64::NAN },
-            multipliers: Vec::new(),
-            stable: false,
-            neutral: false,
+            stability: Stability::default(),
         }
     }
 
@@ -586,8 +561,6 @@ impl StructureOrbits {
         if !with_stability {
             return Some(orbit);
         }
-        let multipliers = half.multipliers();
-        let [stable, neutral] = stability(multipliers.last()?.norm());
         let (t, sign) = since_impact(motion);
         let state = |(section, impulsive): (&Section, Vector2<f64>)| {
             let impulsive = section.propagator(t) * impulsive * sign;
@@ -606,9 +579,7 @@ impl StructureOrbits {
                 q2: sign * (q2 + motion.speed * t),
                 dq2: sign * motion.speed,
             },
-            stable,
-            neutral,
-            multipliers: multipliers.iter().map(|one| [one.re, one.im]).collect(),
+            stability: half.stability(),
             ..orbit
         })
     }
@@ -713,16 +684,21 @@ impl StructureOrbits {
         (from, first): (f64, &StructureOrbit),
         (to, second): (f64, &StructureOrbit),
     ) -> Option<StabilityChange> {
-        let outside = first.unstable();
-        if outside == second.unstable() {
+        let outside = first.stability.outside();
+        if outside == second.stability.outside() {
             return None;
         }
         let at = |angle: f64| at(angle, true);
-        let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
+        let like_first = |angle: f64| at(angle).map(|orbit| orbit.stability.outside() == outside).ok_or(());
         let (before, beyond) = try_bisection(from, to, LOCATION_WIDTH, like_first).ok()?;
         // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
-        let orbit = at(if outside < second.unstable() { beyond } else { before })?;
-        let multiplier = *orbit.multipliers.get(orbit.multipliers.len() - orbit.unstable())?;
+        let orbit = at(if outside < second.stability.outside() {
+            beyond
+        } else {
+            before
+        })?;
+        let multipliers = &orbit.stability.multipliers;
+        let multiplier = *multipliers.get(multipliers.len() - orbit.stability.outside())?;
         let kind = match multiplier {
             [_, im] if im != 0.0 => Bifurcation::NeimarkSacker,
             [re, _] if re > 0.0 => Bifurcation::Fold,
