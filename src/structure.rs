@@ -903,3 +903,71 @@ impl Plant<Structure> {
         self.primary.host.energy(&state, u) + m * (0.5 * dq2 * dq2 - self.moving.system.forces.gravity * q2)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_follows_a_polynomial_forcing() {
+        let (delta, square) = (0.3, 2.5);
+        let oscillator = Oscillator::new(1.0, square, 2.0 * delta);
+        let forcing = [0.7, -0.4, 0.9, 0.6];
+        let [p0, p1, p2, p3] = follower(&oscillator, forcing);
+        let [rate, acceleration] = [[p1, 2.0 * p2, 3.0 * p3, 0.0], [2.0 * p2, 6.0 * p3, 0.0, 0.0]];
+        for (n, p) in [p0, p1, p2, p3].into_iter().enumerate() {
+            let sum = acceleration[n] + 2.0 * delta * rate[n] + square * p;
+            assert!((sum - forcing[n]).abs() < 1e-15, "{n}: {sum}");
+        }
+    }
+
+    #[test]
+    fn repeated_integrals_of_an_exponential_are_their_series_at_any_rate() {
+        for rate in [0.0, -0.3, -0.99, -1.01, -2.0, -5.0] {
+            let t = 1.3;
+            // Of z^k/(k + n)!, times t^n.
+            let series = |n: i32| {
+                let terms = (0..60).scan((1..=n).map(f64::from).product::<f64>().recip(), |term, k| {
+                    let now = *term;
+                    *term *= rate * t / f64::from(k + 1 + n);
+                    Some(now)
+                });
+                terms.sum::<f64>() * t.powi(n)
+            };
+            for (n, integral) in integrals(rate, t).into_iter().enumerate() {
+                let exact = series(n as i32 + 1);
+                assert!((integral / exact - 1.0).abs() < 1e-13, "{rate} {n}: {integral} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_bound_of_the_steady_third_derivative_is_above_it_by_no_more_than_its_two_roundings_up() {
+        let section = Section {
+            oscillator: Oscillator::new(1.0, 4.0, 0.5),
+            drive: [0.8, 0.3],
+            kick: [0.0, 1.0],
+            cavity: [0.9, 0.4],
+        };
+        let drive = Drive::harmonic(100.0, 3.0);
+        let phasor = Complex64::from_polar(100.0, 0.4);
+        let mut part = Part::new(&section, [0.0; 2], 0.0, &drive, drive.omega, (0.0, 0.0));
+        part.split(phasor, drive.omega, &drive.signal);
+        let [y, dy] = part.free.expect("a steady response");
+        (part.x0, part.v0) = (part.x0 - y, part.v0 - dy);
+        let third = |n: i32| {
+            let t = f64::from(n) * 0.01;
+            let turned = Complex64::from_polar(1.0, drive.omega * t);
+            let u = drive_derivatives(&drive, phasor * turned, drive.omega, t);
+            let d = part.derivatives(&part.closed_form(t, phasor, turned), &u);
+            (part.row[0] * d[3] + part.row[1] * d[4]).abs()
+        };
+        let largest = (0..300).map(third).fold(0.0, f64::max);
+        // Sums instead of moduli, of the response and of the two parts of the row: at most sqrt(2) each.
+        assert!(
+            (1.0..2.0).contains(&(part.steady_jerk / largest)),
+            "{} {largest}",
+            part.steady_jerk
+        );
+    }
+}

@@ -96,6 +96,28 @@ fn a_jump_of_the_base_releases_a_particle_only_if_it_moves_it() {
 }
 
 #[test]
+fn a_jump_within_the_rounding_of_the_amplitude_does_not_break_static_friction() {
+    let cavity = Cavity {
+        kinetic_friction: 0.5 / GRAVITY,
+        static_friction: Some(2.0 / GRAVITY),
+        ..Cavity::IDEAL
+    };
+    // The spring pulls at the particle with more than kinetic friction, so that it would go on sliding.
+    let start = State { q1: 1.0, q2: 1.0, ..State::default() };
+    let amplitude = 0.01;
+    for (share, sticks) in [(1.5, true), (2.5, false)] {
+        let mut plant = Plant::new(rig(0.1, 0.1, cavity), start).unwrap();
+        let drive = Drive { amplitude, ..Drive::default() };
+        plant.advance(drive, 1e-3).unwrap();
+        assert!(plant.sticks());
+        // The amplitude before and after counts, in units of the rounding of eight additions.
+        let signal = [-share * 8.0 * f64::EPSILON * amplitude, 0.0, 0.0, 0.0];
+        plant.advance(Drive { signal, ..drive }, 1e-3).unwrap();
+        assert_eq!(plant.sticks(), sticks, "{share}");
+    }
+}
+
+#[test]
 fn a_kick_whose_hop_cannot_be_resolved_moves_both_masses_as_one() {
     let parameters = rig(0.5, 0.25, Cavity { tilt: -0.05, ..Cavity::IDEAL });
     let press = GRAVITY * 0.05f64.sin();

@@ -565,3 +565,27 @@ impl FastPath {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::Parameters;
+    use crate::plant::{Plant, State};
+
+    #[test]
+    fn a_hop_is_predicted_only_if_the_acceleration_towards_the_wall_hardly_changes_in_it() {
+        // Both particles come back: in the second case sooner, because the acceleration grows by far more than an eighth.
+        for (q1, dq1, is_predicted) in [(-0.4, 0.0, true), (-0.05, -1.0, false)] {
+            let start = State { q1, dq1, q2: q1 - 1.0, dq2: dq1 + 1e-3 };
+            let mut plant = Plant::new(Parameters::dimensionless(0.1, 0.0, 0.5), start).expect("a plant");
+            let Plant { moving, fast, .. } = &mut plant;
+            let point = fast.point(moving);
+            fast.coefficients.prepare(&moving.system.free, 0.0);
+            let mut start = Start::new(moving, point);
+            start.here.sample.ddw = start.acceleration(&fast.coefficients, &point);
+            let hop = fast.hop(&start, 1.0).map(|arrival| arrival.t.value());
+            assert_eq!(hop.is_some(), is_predicted, "{q1} {hop:?}");
+            assert!(hop.is_none_or(|t| (t / 5e-3 - 1.0).abs() < 1e-2), "{hop:?}");
+        }
+    }
+}

@@ -252,6 +252,20 @@ mod tests {
         }
 
         #[test]
+        fn the_forcing_by_a_signal_is_bounded_by_its_values_at_the_end_if_it_never_falls(
+            delta in 0.0..3.0f64, omega0 in 0.1..4.0f64, u2 in 0.0..2.0f64, u3 in 0.0..2.0f64, t in 0.0..3.0f64,
+        ) {
+            let oscillator = Oscillator::new(1.0, omega0 * omega0, 2.0 * delta);
+            let [by_value, by_slope] = [t * t * (u2 + t * u3), t * (2.0 * u2 + 3.0 * t * u3)];
+            let exact = omega0 * omega0 * by_value + 2.0 * delta * by_slope + (2.0 * u2 + 6.0 * t * u3);
+            for signs in [[1.0, 1.0], [1.0, -1.0]] {
+                let signal = [0.3, -0.7, signs[0] * u2, signs[1] * u3];
+                let bound = forcing(&oscillator, &Drive { signal, ..Drive::default() }, t);
+                prop_assert!((bound - exact).abs() <= 1e-12 * exact, "{bound} {exact}");
+            }
+        }
+
+        #[test]
         fn a_clear_sample_is_verified(w in -0.5..0.5f64, dw in -0.2..0.2f64, ddw in -0.1..0.1f64) {
             let open = RelativeMotion { w, dw, ddw }.is_open(1.0, 0.1, 1.0);
             prop_assert!(open);

@@ -6,8 +6,8 @@ use std::f64::consts::FRAC_PI_2;
 use lovines::Parameters;
 use nalgebra::Vector3;
 use vines_estimate::Backbone;
-use vines_model::Definition;
-use vines_model::orbit::{DriveCondition, PlantMotion, periodic_motion, resonant_motion};
+use vines_model::orbit::{Condition, PlantMotion, periodic_motion, resonant_motion};
+use vines_model::{Definition, Dimensionless};
 
 use crate::hypothesis::Hypothesis;
 use crate::points::MeasuredPoint;
@@ -102,8 +102,11 @@ impl Motions<'_> {
     }
 
     fn on_line(&self, n: usize, near: &PlantMotion, at: [f64; 2], normal: [f64; 2]) -> Option<PlantMotion> {
-        let conditions = [DriveCondition::PhaseResonance, DriveCondition::Across { at, normal }];
-        periodic_motion(&self.plant, self.goals[n].definition(self.definition), near, conditions).ok()
+        let definition = self.goals[n].definition(self.definition);
+        let (numbers, phase) = (Dimensionless::of(&self.plant, 0.0), definition.phase);
+        let at = [at[0] / numbers.b, numbers.sigma(at[1])];
+        let conditions = [Condition::Phase(phase), Condition::Across { phase, at, normal }];
+        periodic_motion(&self.plant, definition, near, conditions).ok()
     }
 
     /// As [`Self::motion`], with the direction of the curve there.

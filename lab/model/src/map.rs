@@ -19,7 +19,7 @@ use serde::Serialize;
 use crate::Dimensionless;
 use crate::numerics::{SIGNIFICANT, mean, standard_deviation};
 use crate::orbit::{Periodic, SETTLING_DISTANCE, periodic_near};
-use crate::oscillator::ForcedOscillator;
+use crate::oscillator::response;
 use crate::regime::{Impact, Regime, synchrony};
 
 /// Default of the largest number of periods that a cell is followed.
@@ -292,9 +292,9 @@ impl CellRun {
     fn without_impacts(&self) -> Option<RegimeResult> {
         let n = self.periods();
         let [q1, dq1, q2, dq2] = self.states[n];
-        let oscillator = ForcedOscillator::new(&self.scene, self.drive.omega);
-        let [steady, velocity] = oscillator.harmonic(0.0).into();
-        let reach = (q1 - steady).hypot(dq1 - velocity) + oscillator.response(0.0).norm();
+        let omega = self.drive.omega;
+        let steady = response(&self.scene, omega);
+        let reach = (q1 - steady.im).hypot(dq1 - omega * steady.re) + steady.norm();
         (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {
             let last = self.impacts.last().map_or(0.0, |impact| impact.time / TAU);
             self.result(Regime::NoImpacts, (last.ceil() as usize).min(n - 1))

@@ -524,11 +524,6 @@ impl HarmonicFit {
         self.columns.len()
     }
 
-    /// Constant of the polynomial: its value in the middle.
-    pub fn constant(&self) -> f64 {
-        self.coefficients[0]
-    }
-
     /// Complex amplitude a of a harmonic in the middle: `Im(a exp(i n phase))`. `harmonic` counts from 1.
     pub fn harmonic(&self, harmonic: usize) -> Complex<f64> {
         self.pair(self.columns[harmonic - 1])

@@ -8,11 +8,13 @@
 mod continuation;
 mod flight;
 mod half_period;
+mod impacts;
 mod multipliers;
 mod periodic;
 mod plant;
 mod response;
 mod return_map;
+mod shooting;
 mod structure;
 mod study;
 mod symmetric;
@@ -21,16 +23,15 @@ use crate::Dimensionless;
 use serde::Serialize;
 
 pub use continuation::{Branch, BranchBifurcation, BranchEnd, ContinuationLimits, continue_both_ways};
-pub use periodic::{Bifurcation, Condition, Periodic, settle};
+pub use impacts::{Bounce, ImpactPattern};
+pub use periodic::{Periodic, settle};
 pub(crate) use periodic::{SETTLING_DISTANCE, periodic_near};
-pub use plant::{
-    DriveCondition, NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion,
-};
+pub use plant::{NoMotion, PlantMotion, periodic_motion, resonant_motion, resonant_motion_under, settled_motion};
 pub use response::{BifurcationCurve, Component, DOUBLINGS, FrequencyResponse, bifurcation_curves, response};
-pub use return_map::{Bounce, ImpactPattern, Unknowns};
+pub use return_map::{Bifurcation, Condition, Stability, Unknowns};
 pub use structure::{
-    FirstOrder, ModeFacts, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
-    StructureOrbits, StructureRange, StructureStart,
+    ModeFacts, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit, StructureOrbits,
+    StructureRange, StructureStart,
 };
 pub use study::{
     at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone, stable_resonant,
@@ -67,14 +68,6 @@ pub struct Orbit {
     pub stable: bool,
     /// The largest multipliers are on the unit circle, within 1e-7: disturbances neither grow nor decay.
     pub neutral: bool,
-}
-
-/// Distance from the unit circle up to which a multiplier counts as on it: of a double one, rounding leaves half of the digits.
-const ON_CIRCLE: f64 = 1e-7;
-
-/// Whether a motion whose largest multiplier has this modulus is stable, and whether it is neutral.
-fn stability(largest: f64) -> [bool; 2] {
-    [largest < 1.0 - ON_CIRCLE, (largest - 1.0).abs() <= ON_CIRCLE]
 }
 
 /// The state just after an impact on the wall w = +1, where the base displacement is `epsilon G sin(Omega tau + phase)`

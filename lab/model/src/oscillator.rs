@@ -2,7 +2,7 @@
 
 use lovines::Section;
 use lovines::oscillator::Oscillator;
-use nalgebra::{Complex, Vector2};
+use nalgebra::Complex;
 
 use crate::Dimensionless;
 
@@ -16,36 +16,12 @@ pub(crate) fn section(damping: f64) -> Section {
     }
 }
 
-/// The oscillator under the base of a scene at one frequency.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct ForcedOscillator {
-    pub(crate) free: Section,
-    omega: f64,
-    /// Harmonic response of q1 to the base.
-    response: Complex<f64>,
-}
-
-impl ForcedOscillator {
-    /// The oscillator of `scene` at the frequency `omega` over omega0.
-    pub(crate) fn new(scene: &Dimensionless, omega: f64) -> Self {
-        let free = section(scene.epsilon * scene.lambda);
-        // Without excitation there is no response, even at an undamped resonance.
-        let response = if scene.g == 0.0 {
-            Complex::ZERO
-        } else {
-            free.driven(omega)[0] * free.stiffness(omega).inv() * (scene.epsilon * scene.g)
-        };
-        Self { free, omega, response }
+/// Harmonic response of q1 to the base of a scene at the frequency `omega` over omega0.
+pub(crate) fn response(scene: &Dimensionless, omega: f64) -> Complex<f64> {
+    let free = section(scene.epsilon * scene.lambda);
+    // Without excitation there is no response, even at an undamped resonance.
+    if scene.g == 0.0 {
+        return Complex::ZERO;
     }
-
-    /// Harmonic of q1 from a phase of the base on.
-    pub(crate) fn response(&self, phase: f64) -> Complex<f64> {
-        self.response * Complex::from_polar(1.0, phase)
-    }
-
-    /// Harmonic response (q, q') at a phase of the base.
-    pub(crate) fn harmonic(&self, phase: f64) -> Vector2<f64> {
-        let z = self.response(phase);
-        Vector2::new(z.im, self.omega * z.re)
-    }
+    free.driven(omega)[0] * free.stiffness(omega).inv() * (scene.epsilon * scene.g)
 }

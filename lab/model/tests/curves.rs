@@ -15,7 +15,7 @@ use vines_model::{
 };
 
 mod common;
-use common::{setting, within};
+use common::{setting, symmetric, within};
 
 fn scene(g: f64) -> Dimensionless {
     Dimensionless::new(0.0084, 1.43, 0.65, g)
@@ -77,7 +77,7 @@ fn checked(scene: &Dimensionless) -> FrequencyResponse {
             .filter(|one| one.kind == Bifurcation::NeimarkSacker && one.motion.bounds_stability())
         {
             let near = |motion: &Periodic| (motion.sigma - torus.motion.sigma).abs() < 0.1;
-            assert!(points.iter().any(|one| near(one) && one.stable), "{name}");
+            assert!(points.iter().any(|one| near(one) && one.stability.stable), "{name}");
         }
 
         let place = |one: &Periodic| {
@@ -103,11 +103,7 @@ fn components_of_responses_are_complete_distinct_and_reach_what_they_join() {
         if g < 1.01 {
             // A closed isola, which turns twice, and beside it the component of slow particles.
             assert!(count("symmetric 1:1") >= 2, "G = {g}");
-            let closed = || {
-                found
-                    .symmetric()
-                    .filter(|branch| branch.ended == [BranchEnd::Closed; 2])
-            };
+            let closed = || symmetric(&found).filter(|branch| branch.ended == [BranchEnd::Closed; 2]);
             assert!(closed().count() > 0 && closed().all(|one| folds([one].into_iter()).len() == 2));
         }
     }
@@ -119,15 +115,15 @@ fn components_of_responses_are_complete_distinct_and_reach_what_they_join() {
 #[test]
 fn bifurcations_and_branches_close_together_are_told_apart() {
     // At sigma = 4.0125 a complex pair leaves the unit circle and, at 4.0138, one of the two returns: in one step.
-    let close = folds(searched(&scene(1.1514)).symmetric());
+    let close = folds(symmetric(&searched(&scene(1.1514))));
     assert!(close.iter().any(|sigma| (sigma - 4.0138).abs() < 1e-3));
     // At G = 0.84278 two branches meet at sigma = -0.435; below, each of them has a fold there, and above none.
     for (g, count) in [(0.84275, 2), (0.8428, 0), (0.84285, 0)] {
         let scene = Dimensionless::new(0.008650812324298334, 1.3523112557067605, 0.9126958726492855, g);
         let limits = ContinuationLimits { sigma: [-5.0, 5.0], ..ContinuationLimits::default() };
         let found = response(&scene, &limits, DOUBLINGS);
-        assert_eq!(folds(found.symmetric()).len(), count, "G = {g}");
-        assert_eq!(found.symmetric().count(), 2, "G = {g}");
+        assert_eq!(folds(symmetric(&found)).len(), count, "G = {g}");
+        assert_eq!(symmetric(&found).count(), 2, "G = {g}");
     }
 }
 
@@ -163,7 +159,7 @@ fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
         };
         let other = usize::from(!motion.pattern.is_one_to_one());
         counts[other] += 1;
-        counts[2 + other] += usize::from(motion.stable && !found.contains(scene, &motion));
+        counts[2 + other] += usize::from(motion.stability.stable && !found.contains(scene, &motion));
     }
     counts
 }
@@ -198,7 +194,12 @@ fn off_circle(kind: Bifurcation, motion: &Periodic) -> f64 {
         Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (re + 1.0).hypot(*im),
         Bifurcation::NeimarkSacker => (re.hypot(*im) - 1.0).abs(),
     };
-    motion.multipliers.iter().map(distance).fold(f64::MAX, f64::min)
+    motion
+        .stability
+        .multipliers
+        .iter()
+        .map(distance)
+        .fold(f64::MAX, f64::min)
 }
 
 /// The bifurcations of the 1:1 motions at one excitation.

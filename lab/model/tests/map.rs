@@ -75,7 +75,7 @@ fn a_moving_particle_is_never_without_impacts() {
 fn the_exponent_of_a_stable_orbit_is_that_of_its_multipliers() {
     for (g, sigma) in [(1.1, -1.1408), (1.6, -0.9), (2.2, -0.6)] {
         let motion = settle(&scene(g), sigma, MOVING, 2000).unwrap().unwrap();
-        let expected = 2.0 * motion.moduli()[3].ln() / f64::from(motion.pattern.half_periods);
+        let expected = 2.0 * motion.stability.growth().ln() / f64::from(motion.pattern.half_periods);
         let result = at(g, sigma, MOVING);
         let (found, error) = (result.exponent.unwrap(), result.exponent_error.unwrap());
         let tolerance = 0.02 * expected.abs() + 2.0 * error;

@@ -13,7 +13,7 @@ use vines_model::{
 };
 
 mod common;
-use common::{Row, rows};
+use common::{Row, at_phase_zero, rows, symmetric};
 
 #[test]
 fn orbits_match_the_references_to_all_their_digits_and_others_are_on_the_unstable_left_branch() {
@@ -102,9 +102,9 @@ fn scene(g: f64) -> Dimensionless {
 /// Requires that the plant, started on every tenth motion of a branch that does not leave at once, is back at its start after each of two
 /// repetitions.
 fn repeats_on_the_plant(scene: &Dimensionless, branch: &Branch) {
-    let slow = branch.points.iter().filter(|motion| motion.moduli()[3] < 10.0);
+    let slow = branch.points.iter().filter(|motion| motion.stability.growth() < 10.0);
     for motion in slow.step_by(10) {
-        let [_, start @ ..] = motion.motion(scene, 1)[0];
+        let start = at_phase_zero(scene, motion);
         let mut plant = scene.plant(start).unwrap();
         let drive = Dimensionless { g: motion.g, ..*scene }.drive(motion.sigma);
         for n in 1..=2 * motion.pattern.periods() {
@@ -124,24 +124,31 @@ fn an_exact_response_passes_folds_breaks_its_symmetry_and_has_motions_that_the_p
         let branches = || found.components.iter().map(|one| &one.branch);
         branches().for_each(|branch| repeats_on_the_plant(&scene(g), branch));
         let points = || branches().flat_map(|branch| &branch.points);
-        assert!(points().any(|one| one.stable) && points().any(|one| !one.stable));
+        assert!(points().any(|one| one.stability.stable) && points().any(|one| !one.stability.stable));
         let special = |kind| {
-            found
-                .symmetric()
+            symmetric(&found)
                 .flat_map(|branch| &branch.special)
                 .filter(move |one| one.kind == kind)
         };
         assert!(special(Bifurcation::Fold).next().is_some());
         for fold in special(Bifurcation::Fold) {
-            let nearest = fold.motion.multipliers.map(|[re, im]| (re - 1.0).hypot(im));
-            assert!(nearest.into_iter().fold(f64::MAX, f64::min) < 1e-4);
+            let nearest = fold
+                .motion
+                .stability
+                .multipliers
+                .iter()
+                .map(|[re, im]| (re - 1.0).hypot(*im));
+            assert!(nearest.fold(f64::MAX, f64::min) < 1e-4);
         }
         // At the larger excitation symmetry breaks near the theory's speed, and stable asymmetric motions leave it.
         let near = |one: &BranchBifurcation| (one.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03;
         assert_eq!(special(Bifurcation::SymmetryBreaking).any(near), g == 1.6);
         let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - PI).abs() > 0.05;
         let asymmetric = points().filter(|one| one.pattern.is_one_to_one() && !one.pattern.mirrored);
-        assert_eq!(asymmetric.filter(|one| uneven(one)).any(|one| one.stable), g == 1.6);
+        assert_eq!(
+            asymmetric.filter(|one| uneven(one)).any(|one| one.stability.stable),
+            g == 1.6
+        );
     }
 }
 

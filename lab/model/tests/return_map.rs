@@ -122,10 +122,15 @@ fn apart(scene: &Dimensionless, motion: &Periodic) -> [f64; 2] {
         whole.row_mut(row).scale_mut(sign);
     }
     // Sums of powers are smooth where multipliers meet.
-    let multipliers = motion.multipliers.map(|[re, im]| Complex::new(re, im));
+    let multipliers = motion
+        .stability
+        .multipliers
+        .iter()
+        .map(|[re, im]| Complex::new(*re, *im));
+    let multipliers: Vec<_> = multipliers.collect();
     let powers = [whole, whole * whole].map(|power| power.trace());
     let sums = [1, 2].map(|n| multipliers.iter().map(|one| one.powi(n)).sum::<Complex<f64>>().re);
-    let largest = motion.moduli()[3].max(1.0);
+    let largest = motion.stability.growth().max(1.0);
     let growth = (0..2).map(|n| (powers[n] - sums[n]).abs() / largest.powi(n as i32 + 1));
     [off, growth.fold(0.0, f64::max)]
 }
@@ -141,7 +146,12 @@ fn periodic_motions_of_all_patterns_close_by_the_impact_map_and_have_its_multipl
         let limits = ContinuationLimits { sigma: [-3.0, 1.0], ..Default::default() };
         for component in response(&scene, &limits, doublings).components {
             // Within 1e-3 of a graze, the multipliers lose their digits.
-            for motion in component.branch.points.iter().filter(|motion| motion.moduli()[3] < 1e3) {
+            for motion in component
+                .branch
+                .points
+                .iter()
+                .filter(|motion| motion.stability.growth() < 1e3)
+            {
                 let here = apart(&scene, motion);
                 worst = [0, 1].map(|n| worst[n].max(here[n]));
                 count += 1;

@@ -165,16 +165,18 @@ impl<'a> Motion<'a> {
             restitution: rig.particle.restitution,
             cavity: Cavity::IDEAL,
         };
-        let [displacements, velocities] = orbit.start.coordinates(&rig.host).unwrap();
-        let start = StructureState {
-            displacements,
-            velocities,
-            q2: orbit.start.q2,
-            dq2: orbit.start.dq2,
+        let start = &orbit.start;
+        let rest = vec![0.0; start.sections.len()];
+        let rest = StructureState {
+            displacements: rest.clone(),
+            velocities: rest,
+            q2: 0.0,
+            dq2: 0.0,
         };
         let drive = Drive::harmonic(orbit.drive, orbit.omega);
-        let mut plant = Plant::with_host(rig.host.clone(), parameters, &start).unwrap();
+        let mut plant = Plant::with_host(rig.host.clone(), parameters, &rest).unwrap();
         plant.begin(drive).unwrap();
+        plant.set_sections(&start.sections, [start.q2, start.dq2]).unwrap();
         let half = 0.5 * TAU / orbit.omega;
         let middle = (orbit.impact_phase / orbit.omega + 0.5 * half).rem_euclid(half);
         plant.advance(drive, middle).unwrap();
@@ -261,7 +263,7 @@ fn eigenvector(matrix: &DMatrix<f64>, value: Complex<f64>) -> DVector<Complex<f6
 /// Relative errors of the rate of growth: by the derivative of the plant's motion, and of a disturbed plant that leaves the orbit; `None` if the
 /// disturbance grows by less than e in all periods.
 fn rates(rig: &Rig, orbit: &StructureOrbit) -> Option<[f64; 2]> {
-    let expected = 2.0 * orbit.growth().ln();
+    let expected = 2.0 * orbit.stability.growth().ln();
     if expected * (PERIODS as f64) < 1.0 {
         return None;
     }
@@ -333,7 +335,7 @@ fn random_structures_stay_on_stable_orbits_and_leave_unstable_ones_at_the_rate_o
         let inside = branches
             .iter()
             .flat_map(|branch| branch.orbits.iter().skip(1).rev().skip(1));
-        let (settled, lost): (Vec<_>, Vec<_>) = inside.partition(|orbit| orbit.stable);
+        let (settled, lost): (Vec<_>, Vec<_>) = inside.partition(|orbit| orbit.stability.stable);
         if settled.is_empty() && lost.is_empty() {
             continue;
         }
@@ -408,9 +410,10 @@ fn no_symmetric_motion_that_a_plant_settles_on_is_missing_from_the_orbits_of_its
         let speed = motion.plant.state().dq2.abs();
         let found = rig.orbits.at(beside.omega, beside.drive);
         // What is left to settle is the last change over the rate of decay.
-        let is_near =
-            |orbit: &StructureOrbit| (orbit.speed / speed - 1.0).abs() < 1e-9 + 10.0 * left / (1.0 - orbit.growth());
-        let is_found = found.iter().any(|orbit| orbit.stable && is_near(orbit));
+        let is_near = |orbit: &StructureOrbit| {
+            (orbit.speed / speed - 1.0).abs() < 1e-9 + 10.0 * left / (1.0 - orbit.stability.growth())
+        };
+        let is_found = found.iter().any(|orbit| orbit.stability.stable && is_near(orbit));
         assert!(
             is_found,
             "{} at {} rad/s: {speed} m/s {left:e}, {found:?}",

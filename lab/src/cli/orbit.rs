@@ -10,7 +10,7 @@ use serde_json::json;
 use vines::comparison::ExactCurve;
 use vines::orbit::{
     Bifurcation, Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, OrbitCurve, Periodic, PlantMotion,
-    backbone, continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion,
+    Stability, backbone, continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion,
     stable_resonant,
 };
 use vines::report::responses;
@@ -201,7 +201,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Continuatio
     })?;
     let (figure, json, scene, range) = (arguments.figure.clone(), arguments.json, *scene, limits.sigma);
     Ok(Results::with_figure(text, json, figure, move || {
-        let place = |motion: &Periodic| ([motion.sigma, motion.c, motion.b], !motion.is_unstable());
+        let place = |motion: &Periodic| ([motion.sigma, motion.c, motion.b], !motion.stability.is_unstable());
         let components = response.components.iter();
         let curves = components.map(|component| component.branch.points.iter().map(place).collect());
         responses(&scene, curves, &ExactCurve::of(&scene), range).svg()
@@ -277,8 +277,7 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
     } = motion;
     let (f_hz, sigma) = (omega / TAU, numbers.sigma(omega));
     let (a_m, phase_deg) = (response.norm(), response.arg().to_degrees());
-    let roots = motion.multipliers.map(|z| [z.re, z.im]);
-    let [stable, neutral] = [motion.is_stable(), motion.is_neutral()];
+    let Stability { multipliers: roots, stable, neutral } = &motion.stability;
     let mut result = json!({
         "f_hz": f_hz,
         "sigma": sigma,
@@ -315,7 +314,7 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
              impacts {impacts}, at rest on a wall {rests}, sticking to the floor {sticks}\n  multipliers {}: {}\n{ideal}\n{}",
             if periods == 1 { "" } else { "s" },
             multipliers(roots),
-            match [stable, neutral] {
+            match [*stable, *neutral] {
                 [true, _] => "stable",
                 [_, true] => "neutral",
                 _ => "unstable",
@@ -352,8 +351,9 @@ fn events(motion: &PlantMotion) -> Vec<MotionEvent> {
 }
 
 /// Multipliers in a line: real and imaginary parts.
-fn multipliers(multipliers: [[f64; 2]; 4]) -> String {
-    multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i")).join(", ")
+fn multipliers(multipliers: &[[f64; 2]]) -> String {
+    let each = multipliers.iter().map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+    each.collect::<Vec<_>>().join(", ")
 }
 
 /// Refuses a detuning whose frequency is not positive.
@@ -390,7 +390,7 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     format!(
         "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
         gamma.to_degrees(),
-        multipliers(motion.multipliers),
+        multipliers(&motion.stability.multipliers),
         table.text()
     )
 }
@@ -416,8 +416,8 @@ impl From<&Periodic> for Place {
     fn from(one: &Periodic) -> Self {
         Self {
             numbers: [one.sigma, one.g, one.c, one.gamma, one.b],
-            largest: one.moduli()[3],
-            stability: stability(one.stable, one.neutral),
+            largest: one.stability.growth(),
+            stability: stability(one.stability.stable, one.stability.neutral),
         }
     }
 }

@@ -206,7 +206,7 @@ fn words(kind: Bifurcation) -> &'static str {
 
 /// A stretch of stable orbits, from its smaller to its larger C.
 fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>; 2], b: f64) -> Vec<String> {
-    let modes = if run[0].neutral {
+    let modes = if run[0].stability.neutral {
         format!("{modes}, neutral")
     } else {
         modes.into()
@@ -241,6 +241,6 @@ fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>;
 fn row(orbit: &StructureOrbit, b: f64) -> [Cell; 6] {
     let [response, drive] = [orbit.response, orbit.drive].map(|value| format!("{value:.4e}"));
     let (hertz, c) = (orbit.omega / TAU, orbit.response / b);
-    let stable = stability(orbit.stable, orbit.neutral);
-    cells![hertz, response, c, drive, orbit.growth(), stable]
+    let stable = stability(orbit.stability.stable, orbit.stability.neutral);
+    cells![hertz, response, c, drive, orbit.stability.growth(), stable]
 }

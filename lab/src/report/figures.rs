@@ -399,7 +399,12 @@ pub fn structure(scene: &Scene, survey: &Survey) -> Option<Figure> {
     let d = scene.dimensionless();
     let unit = scene.structure.as_ref()?.units().response.of_metres(d.b);
     let curves = |branches: &[StructureBranch]| -> Vec<Vec<Marked>> {
-        let place = |orbit: &StructureOrbit| ((d.sigma(orbit.omega), orbit.response / unit), !orbit.is_unstable());
+        let place = |orbit: &StructureOrbit| {
+            (
+                (d.sigma(orbit.omega), orbit.response / unit),
+                !orbit.stability.is_unstable(),
+            )
+        };
         branches
             .iter()
             .map(|branch| branch.orbits.iter().map(place).collect())

@@ -250,7 +250,7 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
     let orbit = orbits
         .at_phase_resonance(0.99 * TAU)
         .into_iter()
-        .find(|orbit| orbit.stable)
+        .find(|orbit| orbit.stability.stable)
         .unwrap();
     let mut plant = Plant::with_host(structure.host.clone(), scene.plant, &StructureState::default()).unwrap();
     let drive = Drive::harmonic(orbit.drive, orbit.omega);

@@ -441,7 +441,7 @@ fn the_presets_say_which_mode_takes_the_stability_of_the_1_1_motion() {
     };
     // The study's operating point is unstable on a cantilever, and symmetry breaks through its third mode.
     let cantilever = survey("cantilever");
-    assert!(cantilever.orbits.iter().all(|orbit| !orbit.stable));
+    assert!(cantilever.orbits.iter().all(|orbit| !orbit.stability.stable));
     let modes: Vec<usize> = cantilever.taken().map(|(mode, _)| mode + 1).collect();
     assert!(modes.contains(&2) && modes.contains(&3), "{modes:?}");
     // A second mode near the third harmonic gives a stable motion where one mode has none.
@@ -454,17 +454,23 @@ fn the_presets_say_which_mode_takes_the_stability_of_the_1_1_motion() {
         let all = branches.iter().flat_map(|branch| &branch.orbits);
         all.min_by(|one, other| (one.omega - omega).abs().total_cmp(&(other.omega - omega).abs()))
             .unwrap()
+            .stability
             .stable
     };
-    assert!(orbit.stable && !alone(orbit.omega));
+    assert!(orbit.stability.stable && !alone(orbit.omega));
     // The stable motion of the frame lies between its modes, and the backbone passes through it.
     let frame = survey("frame");
-    let [orbit] = frame.orbits.iter().filter(|orbit| orbit.stable).collect::<Vec<_>>()[..] else {
+    let [orbit] = frame
+        .orbits
+        .iter()
+        .filter(|orbit| orbit.stability.stable)
+        .collect::<Vec<_>>()[..]
+    else {
         panic!("{:?}", frame.orbits)
     };
     let near = |one: &&StructureOrbit| (one.drive / orbit.drive - 1.0).hypot(one.omega / orbit.omega - 1.0) < 0.01;
     let curve = frame.facts.all.iter().flat_map(|branch| &branch.orbits);
-    assert!(curve.filter(near).any(|one| one.stable));
+    assert!(curve.filter(near).any(|one| one.stability.stable));
 }
 
 #[test]
@@ -698,7 +704,7 @@ fn a_structure_with_a_light_particle_has_the_orbits_of_the_same_oscillator() {
             .all
             .iter()
             .flat_map(|branch| &branch.orbits)
-            .any(|orbit| orbit.stable);
+            .any(|orbit| orbit.stability.stable);
         assert!(stable, "no stable orbit of the backbone at epsilon = {epsilon:e}");
     }
 }

@@ -1,8 +1,8 @@
 //! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/regimes.md, eq. 27).
 //!
-//! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more selects the curve:
-//! fixed G for a frequency response, phase resonance for the backbone. The step follows the tangent and shrinks where the
-//! curve bends. A branch ends where its pattern of impacts ends, at a graze.
+//! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more selects the curve: fixed G for a frequency
+//! response, a multiplier on the unit circle for a curve of bifurcations. The step follows the tangent and shrinks where the curve bends. A branch
+//! ends where its pattern of impacts ends, at a graze.
 //!
 //! Each kind of bifurcation has a test function of the multipliers that is zero there, and smooth also where multipliers meet. A change of
 //! its sign shows a bifurcation; two of a kind within one step are missed.
@@ -10,8 +10,9 @@
 use nalgebra::{Matrix4, Matrix6};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
-use super::periodic::{Bifurcation, Condition, Periodic, wrapped};
-use super::return_map::{Bounce, ImpactPattern, Unknowns};
+use super::impacts::{Bounce, ImpactPattern, ImpactSection};
+use super::periodic::{Periodic, wrapped};
+use super::return_map::{Bifurcation, Condition, Stability, Unknowns};
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
 
@@ -86,7 +87,7 @@ const DRAWN: f64 = 1e-4;
 
 /// A motion of a branch as it is serialised; the impacts follow from the first one.
 #[derive(Serialize)]
-struct DrawnMotion {
+struct DrawnMotion<'a> {
     #[serde(rename = "G")]
     g: f64,
     sigma: f64,
@@ -95,28 +96,25 @@ struct DrawnMotion {
     gamma: f64,
     #[serde(rename = "B")]
     b: f64,
-    multipliers: [[f64; 2]; 4],
-    stable: bool,
-    neutral: bool,
+    #[serde(flatten)]
+    stability: &'a Stability,
     start: Bounce,
 }
 
 impl Serialize for Branch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let drawn = |motion: &Periodic| {
-            let Periodic { g, sigma, c, gamma, b, multipliers, stable, neutral, .. } = *motion;
+        fn drawn(motion: &Periodic) -> DrawnMotion<'_> {
+            let Periodic { g, sigma, c, gamma, b, .. } = *motion;
             DrawnMotion {
                 g,
                 sigma,
                 c,
                 gamma,
                 b,
-                multipliers,
-                stable,
-                neutral,
+                stability: &motion.stability,
                 start: motion.bounces[0],
             }
-        };
+        }
         let points: Vec<DrawnMotion> = self.drawn().into_iter().map(drawn).collect();
         let mut fields = serializer.serialize_struct("Branch", 4)?;
         fields.serialize_field("shape", self.pattern())?;
@@ -133,7 +131,7 @@ impl Branch {
         let points = &self.points;
         let (mut drawn, mut from) = (vec![&points[0]], 0);
         for to in 1..points.len() {
-            let kind = |n: usize| [points[n].stable, points[n].neutral];
+            let kind = |n: usize| [points[n].stability.stable, points[n].stability.neutral];
             let changes = |n: usize| kind(n) != kind(n - 1);
             let is_off = |n: usize| off(&points[n], [&points[from], &points[to]]) > DRAWN;
             let ends = changes(to) || to > 1 && changes(to - 1);
@@ -149,7 +147,8 @@ impl Branch {
     /// Its motions are not 1:1, and the last ones are unstable.
     fn winds(&self) -> bool {
         let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
-        !self.pattern().is_one_to_one() && last.is_some_and(|last| last.iter().all(Periodic::is_unstable))
+        !self.pattern().is_one_to_one()
+            && last.is_some_and(|last| last.iter().all(|motion| motion.stability.is_unstable()))
     }
 }
 
@@ -216,8 +215,9 @@ impl Curve<'_> {
     /// The direction of the curve, and the sign of its equations' determinant, which is the same all along the curve.
     fn tangent(&self, at: &Periodic, towards: &Unknowns) -> Option<(Unknowns, f64)> {
         let mut matrix = Matrix6::zeros();
-        matrix.fixed_rows_mut::<4>(0).copy_from(&at.map.by);
-        let (_, by) = self.condition.value(self.scene, self.pattern, &at.unknowns(), &at.map);
+        matrix.fixed_rows_mut::<4>(0).copy_from(&at.map.closing());
+        let map = &mut ImpactSection { scene: self.scene, pattern: self.pattern };
+        let (_, by) = self.condition.value(map, &at.unknowns(), &at.map);
         matrix.set_row(4, &by);
         matrix.set_row(5, &towards.transpose());
         let mut right = Unknowns::zeros();
@@ -266,7 +266,7 @@ impl Curve<'_> {
             return Some(BranchEnd::Joins);
         }
         match self.condition {
-            Condition::Bifurcation(Bifurcation::NeimarkSacker) if !next.on_circle(1e-3, 1e-6) => {
+            Condition::Bifurcation(Bifurcation::NeimarkSacker) if !next.stability.on_circle(1e-3, 1e-6) => {
                 return Some(BranchEnd::Resonance);
             }
             Condition::Bifurcation(_) => {}
@@ -300,7 +300,7 @@ impl Curve<'_> {
             return Some(BranchEnd::Range);
         }
         if branch.winds() {
-            let stable = branch.points.iter().rposition(|motion| !motion.is_unstable());
+            let stable = branch.points.iter().rposition(|motion| !motion.stability.is_unstable());
             branch.points.truncate(stable.unwrap_or(0) + 2);
             return Some(BranchEnd::Unstable);
         }
@@ -325,11 +325,11 @@ impl Curve<'_> {
     fn crossings(&self, chord: Unknowns, [from, to]: [&Periodic; 2]) -> Vec<BranchBifurcation> {
         let at = self.beside(from, chord);
         let crossing = |kind: Bifurcation| {
-            let [first, last] = [from, to].map(|motion| kind.test(&motion.map.monodromy));
+            let [first, last] = [from, to].map(|motion| kind.test(&motion.map.monodromy()));
             if first * last >= 0.0 || first.abs().max(last.abs()) < TEST_FUNCTION_ROUNDING {
                 return None;
             }
-            let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy) * first > 0.0);
+            let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy()) * first > 0.0);
             let (_, beyond) = try_bisection::<()>(0.0, 1.0, LOCATION_FRACTION, like_first).ok()?;
             let motion = at(beyond)?;
             // Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
@@ -338,14 +338,15 @@ impl Curve<'_> {
             } else {
                 0.0
             };
-            let is_on_circle = motion.on_circle(imaginary, CROSSING_DISTANCE);
+            let is_on_circle = motion.stability.on_circle(imaginary, CROSSING_DISTANCE);
             is_on_circle.then_some((beyond, BranchBifurcation { kind, motion }))
         };
-        let kinds = [
-            Bifurcation::Fold,
-            Bifurcation::flip(self.pattern),
-            Bifurcation::NeimarkSacker,
-        ];
+        let flip = if self.pattern.mirrored {
+            Bifurcation::SymmetryBreaking
+        } else {
+            Bifurcation::PeriodDoubling
+        };
+        let kinds = [Bifurcation::Fold, flip, Bifurcation::NeimarkSacker];
         let mut found: Vec<_> = kinds.into_iter().filter_map(crossing).collect();
         found.sort_by(|first, second| first.0.total_cmp(&second.0));
         found.into_iter().map(|found| found.1).collect()
@@ -440,7 +441,7 @@ pub(super) fn branch_off(
 ) -> Option<Branch> {
     let from = &at.motion;
     // The eigenvector of the map for the multiplier -1.
-    let svd = (from.map.monodromy + Matrix4::identity()).svd(false, true);
+    let svd = (from.map.monodromy() + Matrix4::identity()).svd(false, true);
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);

@@ -13,6 +13,7 @@ use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2, Vector2};
 
 use super::flight::Flight;
 use super::multipliers::{self, Impact};
+use super::return_map::Stability;
 use super::symmetric::{Particle, SymmetricMotion, alternating};
 
 /// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
@@ -59,16 +60,13 @@ impl HalfPeriod {
         })
     }
 
-    /// The multipliers of the half period, by rising modulus.
-    pub(super) fn multipliers(&self) -> Vec<Complex<f64>> {
+    pub(super) fn stability(&self) -> Stability {
         // The matrix of one oscillator is as fast, and keeps half of the digits of a double multiplier.
         let found = (self.flows.len() > 2)
             .then(|| multipliers::multipliers(&self.flows, self.impact))
             .flatten();
-        let mut multipliers =
-            found.unwrap_or_else(|| map(&self.flows, self.impact).complex_eigenvalues().as_slice().to_vec());
-        multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
-        multipliers
+        let all = || map(&self.flows, self.impact).complex_eigenvalues().as_slice().to_vec();
+        Stability::of(&found.unwrap_or_else(all))
     }
 
     /// The part of (x, v) of every section after the impact that the impulses make.

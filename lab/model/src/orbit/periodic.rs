@@ -1,125 +1,18 @@
-//! Periodic motions of any pattern of impacts: the equations that close and select them, Newton's method, stability, and the motion near a
-//! simulated state (docs/regimes.md, eq. 26).
+//! Periodic motions of any pattern of impacts, and the motion near a simulated state.
 
 use std::f64::consts::TAU;
 
 use lovines::{InvalidValue, State};
-use nalgebra::{Complex, Matrix4, Matrix6, RowVector6, SVector, Vector4};
+use nalgebra::{SVector, Vector4};
 use serde::Serialize;
 
-use super::return_map::{Bounce, ImpactPattern, Impacts, ReturnMap, Unknowns, follow};
-use super::stability;
+use super::impacts::{Bounce, ImpactPattern, ImpactSection, Impacts};
+use super::return_map::{Closing, Condition, Return, Stability, Unknowns};
 use crate::Dimensionless;
-use crate::numerics::{Equations, newton};
 
 /// A phase in (-pi, pi].
 pub(super) fn wrapped(phase: f64) -> f64 {
     phase - TAU * (phase / TAU).round()
-}
-
-/// An equation that selects a motion, in addition to the four that close it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Condition {
-    /// sigma has this value.
-    Sigma(f64),
-    /// G has this value.
-    Excitation(f64),
-    /// A multiplier, or a pair of them, is on the unit circle.
-    Bifurcation(Bifurcation),
-    /// The unknowns lie in a plane: the end of a step along a curve.
-    Plane {
-        /// A point of the plane.
-        through: Unknowns,
-        /// Its normal, of length 1.
-        normal: Unknowns,
-    },
-}
-
-/// How stability changes at a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Bifurcation {
-    /// A multiplier passes +1: the frequency response turns back.
-    #[serde(rename = "fold")]
-    Fold,
-    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
-    #[serde(rename = "symmetry breaking")]
-    SymmetryBreaking,
-    /// A multiplier of the whole period passes -1.
-    #[serde(rename = "period doubling")]
-    PeriodDoubling,
-    /// A complex pair leaves the unit circle: modulation begins where the motion was stable.
-    #[serde(rename = "Neimark-Sacker")]
-    NeimarkSacker,
-}
-
-/// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
-const MAP_DIFFERENCE: f64 = 1e-6;
-
-impl Bifurcation {
-    /// As in a table.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::NeimarkSacker => "Neimark-Sacker",
-        }
-    }
-
-    /// The one at which a multiplier of a pattern's map is -1.
-    pub(super) fn flip(pattern: &ImpactPattern) -> Self {
-        if pattern.mirrored {
-            Bifurcation::SymmetryBreaking
-        } else {
-            Bifurcation::PeriodDoubling
-        }
-    }
-
-    /// Zero where the multipliers of a map are on the unit circle as the bifurcation says, and smooth also where multipliers meet.
-    pub(super) fn test(self, map: &Matrix4<f64>) -> f64 {
-        match self {
-            Bifurcation::Fold => (map - Matrix4::identity()).determinant(),
-            Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (map + Matrix4::identity()).determinant(),
-            // The products of two multipliers are the eigenvalues of the second compound matrix.
-            Bifurcation::NeimarkSacker => {
-                let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-                let minor = |(a, b): (usize, usize), (c, d): (usize, usize)| {
-                    map[(a, c)] * map[(b, d)] - map[(a, d)] * map[(b, c)]
-                };
-                let compound = Matrix6::from_fn(|row, column| minor(pairs[row], pairs[column]));
-                (compound - Matrix6::identity()).determinant()
-            }
-        }
-    }
-}
-
-impl Condition {
-    /// The value of the equation and its derivative by the unknowns.
-    pub(super) fn value(
-        &self,
-        scene: &Dimensionless,
-        pattern: &ImpactPattern,
-        x: &Unknowns,
-        map: &ReturnMap,
-    ) -> (f64, RowVector6<f64>) {
-        let unit = |n: usize| RowVector6::from_fn(|_, column| f64::from(u8::from(column == n)));
-        match *self {
-            Condition::Sigma(sigma) => (x[4] - sigma, unit(4)),
-            Condition::Excitation(g) => (x[5] - g, unit(5)),
-            Condition::Plane { through, normal } => (normal.dot(&(x - through)), normal.transpose()),
-            Condition::Bifurcation(kind) => {
-                let value = |map: &ReturnMap| kind.test(&map.monodromy);
-                // Central differences; NaN where the pattern ends.
-                let at = |n: usize, step: f64| {
-                    let mut moved = *x;
-                    moved[n] += step;
-                    follow(scene, pattern, &moved, |_, _| {}).map_or(f64::NAN, |map| value(&map))
-                };
-                let slope = |n: usize| (at(n, MAP_DIFFERENCE) - at(n, -MAP_DIFFERENCE)) / (2.0 * MAP_DIFFERENCE);
-                (value(map), RowVector6::from_fn(|_, n| slope(n)))
-            }
-        }
-    }
 }
 
 /// An exact periodic motion.
@@ -143,37 +36,12 @@ pub struct Periodic {
     pub pattern: ImpactPattern,
     /// The states just after the impacts of the map.
     pub bounces: Vec<Bounce>,
-    /// Multipliers (real, imaginary) of the map, by rising modulus; a mirrored pattern has a map of half of its period.
-    pub multipliers: [[f64; 2]; 4],
-    /// All of them are inside the unit circle.
-    pub stable: bool,
-    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
-    pub neutral: bool,
+    /// Of the map; a mirrored pattern has a map of half of its period.
+    #[serde(flatten)]
+    pub stability: Stability,
     /// The map with its derivatives.
     #[serde(skip)]
-    pub(super) map: ReturnMap,
-}
-
-/// The equations of a motion: four that close it, and two that select it.
-struct Closing<'a> {
-    scene: &'a Dimensionless,
-    pattern: &'a ImpactPattern,
-    conditions: [Condition; 2],
-}
-
-impl Equations<6> for Closing<'_> {
-    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>)> {
-        let map = follow(self.scene, self.pattern, x, |_, _| {})?;
-        let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
-        jacobian.fixed_rows_mut::<4>(0).copy_from(&map.by);
-        residual.fixed_rows_mut::<4>(0).copy_from(&map.residual);
-        for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
-            let (value, by) = condition.value(self.scene, self.pattern, x, &map);
-            jacobian.set_row(row, &by);
-            residual[row] = value;
-        }
-        Some((residual, jacobian))
-    }
+    pub(super) map: Return,
 }
 
 impl Periodic {
@@ -185,39 +53,30 @@ impl Periodic {
         guess: &Unknowns,
         conditions: [Condition; 2],
     ) -> Option<Self> {
-        let x = newton(&mut Closing { scene, pattern, conditions }, *guess)?;
+        let map = &mut ImpactSection { scene, pattern };
+        let x = Closing { map, conditions }.solve(*guess)?;
         Self::at(scene, pattern, &x)
     }
 
     /// The motion at unknowns that satisfy the closing equations.
     fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
         let (mut bounces, mut duration, mut travelled) = (Vec::new(), 0.0, 0.0);
-        let map = follow(scene, pattern, x, |bounce, time| {
+        let map = ImpactSection { scene, pattern }.follow(x, |bounce, time| {
             bounces.push(bounce);
             duration += time;
             travelled += bounce.dq2.abs() * time;
         })?;
-        let mut multipliers: [Complex<f64>; 4] = map.monodromy.complex_eigenvalues().into();
-        multipliers.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
-        let [stable, neutral] = stability(multipliers[3].norm());
         Some(Self {
             g: x[5],
             sigma: x[4],
-            c: map.s.norm(),
-            gamma: wrapped(map.s.arg()),
+            c: map.response.norm(),
+            gamma: wrapped(map.response.arg()),
             b: travelled / duration,
             pattern: pattern.clone(),
             bounces,
-            multipliers: multipliers.map(|multiplier| [multiplier.re, multiplier.im]),
-            stable,
-            neutral,
+            stability: map.stability(),
             map,
         })
-    }
-
-    /// Whether a multiplier is outside the unit circle.
-    pub fn is_unstable(&self) -> bool {
-        !self.stable && !self.neutral
     }
 
     /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
@@ -248,53 +107,14 @@ impl Periodic {
         (self.invariants() - other.invariants()).norm()
     }
 
-    /// A multiplier whose imaginary part has at least the size `imaginary` is within `distance` of the unit circle.
-    pub(super) fn on_circle(&self, imaginary: f64, distance: f64) -> bool {
-        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() >= imaginary);
-        pairs.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < distance)
-    }
-
     /// No multiplier is outside the unit circle, except for those that a bifurcation places on it.
     pub fn bounds_stability(&self) -> bool {
-        self.moduli()[3] < 1.0 + 1e-5
-    }
-
-    /// Moduli of the multipliers, ascending.
-    pub fn moduli(&self) -> [f64; 4] {
-        self.multipliers.map(|[re, im]| re.hypot(im))
+        self.stability.growth() < 1.0 + 1e-5
     }
 
     /// Largest Lyapunov exponent per period of the base.
     pub(crate) fn exponent(&self) -> f64 {
-        2.0 * self.moduli()[3].ln() / f64::from(self.pattern.half_periods)
-    }
-
-    /// (tau, q1, q1', q2, q2') at `points` equal steps over one period of the base, from a passage of the base through
-    /// zero, upwards; dimensionless. The impacts fall between the points.
-    pub fn motion(&self, scene: &Dimensionless, points: usize) -> Vec<[f64; 5]> {
-        let (scene, omega) = (Dimensionless { g: self.g, ..*scene }, 1.0 + scene.epsilon * self.sigma);
-        // The bounces of the whole period; a mirrored pattern's other half is minus the first.
-        let (half, mut bounces, mut period) = (self.pattern.turn(), self.bounces.clone(), self.pattern.turn());
-        if self.pattern.mirrored {
-            bounces.extend(self.bounces.iter().map(|bounce| Bounce {
-                phase: bounce.phase + half,
-                q1: -bounce.q1,
-                dq1: -bounce.dq1,
-                dq2: -bounce.dq2,
-                wall: -bounce.wall,
-            }));
-            period = 2.0 * half;
-        }
-        let at = |n: usize| {
-            let phase = TAU * n as f64 / points as f64;
-            let since = |bounce: &Bounce| (phase - bounce.phase).rem_euclid(period);
-            let last = bounces
-                .iter()
-                .min_by(|first, second| since(first).total_cmp(&since(second)))?;
-            let [q1, dq1, q2, dq2] = Impacts::after(&scene, self.sigma, last)?.state(since(last) / omega)?;
-            Some([phase / omega, q1, dq1, q2, dq2])
-        };
-        (0..points).filter_map(at).collect()
+        2.0 * self.stability.growth().ln() / f64::from(self.pattern.half_periods)
     }
 }
 
@@ -321,7 +141,7 @@ pub fn settle(
         plant.advance(drive, TAU / drive.omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
-    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| !motion.is_unstable()))
+    Ok(periodic_near(scene, sigma, [q1, dq1, q2, dq2]).filter(|motion| !motion.stability.is_unstable()))
 }
 
 /// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at phase 0 of the base; one
@@ -338,7 +158,7 @@ pub(crate) fn periodic_near(scene: &Dimensionless, sigma: f64, state: [f64; 4]) 
         .find_map(|pattern| {
             let found = Periodic::find(scene, &pattern, &guess, conditions)?;
             let close = (found.unknowns() - guess).norm() < 10.0 * SETTLING_DISTANCE;
-            if close && found.is_unstable() {
+            if close && found.stability.is_unstable() {
                 unstable.get_or_insert(found);
                 return None;
             }

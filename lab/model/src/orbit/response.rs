@@ -7,8 +7,9 @@
 use serde::Serialize;
 
 use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
-use super::periodic::{Bifurcation, Condition, LONGEST_PATTERN, Periodic};
-use super::return_map::ImpactPattern;
+use super::impacts::ImpactPattern;
+use super::periodic::{LONGEST_PATTERN, Periodic};
+use super::return_map::{Bifurcation, Condition};
 use super::study::{least_excitation, symmetric_orbits};
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
@@ -121,12 +122,6 @@ impl Search<'_> {
 }
 
 impl FrequencyResponse {
-    /// The components of symmetric 1:1 motions.
-    pub fn symmetric(&self) -> impl Iterator<Item = &Branch> {
-        let symmetric = |branch: &&Branch| branch.pattern().is_symmetric();
-        self.components.iter().map(|branch| &branch.branch).filter(symmetric)
-    }
-
     /// A motion of the scene lies on one of the components.
     pub fn contains(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
         self.components
@@ -143,7 +138,11 @@ impl Branch {
 
     /// The middle motion of all, and the middle one of the motions that are not unstable: a branch that contains both contains this branch.
     fn typical(&self) -> impl Iterator<Item = &Periodic> {
-        let stable: Vec<&Periodic> = self.points.iter().filter(|motion| !motion.is_unstable()).collect();
+        let stable: Vec<&Periodic> = self
+            .points
+            .iter()
+            .filter(|motion| !motion.stability.is_unstable())
+            .collect();
         let middle = stable.get(stable.len() / 2).copied();
         [self.points.get(self.points.len() / 2), middle].into_iter().flatten()
     }

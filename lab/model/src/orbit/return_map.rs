@@ -1,301 +1,264 @@
-//! The return map of a pattern of impacts, by shooting: the plant's own motion from an impact on, with its derivative ([`Variation`]).
+//! Return maps: the equations that close a periodic motion and select it, Newton's method, multipliers and bifurcations (docs/regimes.md, eq. 27).
 //!
-//! The section is the state just after an impact. A disturbed motion reaches the wall a little earlier or later, which moves its state along the
-//! motion, and its phase. A start at another phase of the base is the same motion, begun earlier or later.
+//! A motion starts in a section, an event or a phase of the base, and returns to it. The section has four coordinates; frequency and amplitude of
+//! the base are unknown as well, and two conditions select the motion.
 
-use std::f64::consts::{PI, TAU};
-use std::ops::ControlFlow;
-
-use lovines::{Drive, Event, Parameters, Plant, State, Variation};
-use nalgebra::{Complex, Matrix4, Matrix4x6, RowVector6, Vector4, Vector6};
+use nalgebra::{Complex, Matrix4, Matrix4x6, Matrix6, RowVector6, Vector4, Vector6};
 use serde::Serialize;
 
-use super::flight::GRAZING;
-use crate::oscillator::ForcedOscillator;
-use crate::{Definition, Dimensionless, Sensor};
+use crate::numerics::{Equations, newton};
 
-/// Unknowns of a periodic motion: (phase, q1, q1', q2') after its first impact, sigma, G.
+/// Unknowns of a periodic motion: four coordinates at its section, sigma, G.
 pub type Unknowns = Vector6<f64>;
 
-/// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ImpactPattern {
-    /// Walls hit, one after another, over the map; the first is the one the motion starts from.
-    pub walls: Vec<f64>,
-    /// Half periods of the base over the map: even, except for a mirrored pattern, where it is odd.
-    pub half_periods: u32,
-    /// Minus itself after those half periods.
-    pub mirrored: bool,
+/// A map from a section of the motion to itself.
+pub(super) trait ReturnMap {
+    /// The return of the motion from the unknowns `x`; None where it does not return.
+    fn at(&mut self, x: &Unknowns) -> Option<Return>;
+
+    /// Unknowns of the same motion at another section, if it serves better from here on.
+    fn restarted(&mut self, _x: &Unknowns) -> Option<Unknowns> {
+        None
+    }
 }
 
-impl ImpactPattern {
-    /// Two impacts per period, half a period apart: symmetric 1:1.
-    pub fn symmetric() -> Self {
-        Self { walls: vec![1.0], half_periods: 1, mirrored: true }
+/// The return of a motion to its section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Return {
+    /// Coordinates at the end less those at the start.
+    pub apart: Vector4<f64>,
+    /// Derivative of the coordinates at the end by the unknowns.
+    pub by: Matrix4x6<f64>,
+    /// First harmonic S of the response relative to the reference, over b: the response has the part `Im(S exp(i phase))`. Its derivatives.
+    pub response: Complex<f64>,
+    pub response_by: [Complex<f64>; 6],
+}
+
+impl Return {
+    /// Derivative of the closing error by the unknowns.
+    pub(super) fn closing(&self) -> Matrix4x6<f64> {
+        self.by - Matrix4x6::identity()
     }
 
-    /// Two impacts per period, half a period apart.
-    pub fn is_symmetric(&self) -> bool {
-        self.mirrored && self.is_one_to_one()
+    /// Derivative of the map by the coordinates: its eigenvalues are the multipliers.
+    pub(super) fn monodromy(&self) -> Matrix4<f64> {
+        self.by.fixed_columns::<4>(0).into()
     }
 
-    /// Two impacts per period.
-    pub fn is_one_to_one(&self) -> bool {
-        self.periods() == 1 && self.impacts() == 2
+    pub(super) fn stability(&self) -> Stability {
+        Stability::of(self.monodromy().complex_eigenvalues().as_slice())
+    }
+}
+
+/// How disturbances of a motion develop.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Stability {
+    /// Multipliers (real, imaginary) of the map, by rising modulus. The map of a mirrored motion covers half of its period.
+    pub multipliers: Vec<[f64; 2]>,
+    /// All of them are inside the unit circle.
+    pub stable: bool,
+    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
+    pub neutral: bool,
+}
+
+/// Distance from the unit circle up to which a multiplier counts as on it: of a double one, rounding leaves half of the digits.
+const ON_CIRCLE: f64 = 1e-7;
+
+fn modulus([re, im]: &[f64; 2]) -> f64 {
+    re.hypot(*im)
+}
+
+impl Stability {
+    /// By the multipliers in any order.
+    pub(super) fn of(multipliers: &[Complex<f64>]) -> Self {
+        let mut sorted = multipliers.to_vec();
+        sorted.sort_unstable_by(|first, second| first.norm().total_cmp(&second.norm()));
+        let largest = sorted.last().map_or(f64::NAN, |largest| largest.norm());
+        Self {
+            multipliers: sorted.iter().map(|one| [one.re, one.im]).collect(),
+            stable: largest < 1.0 - ON_CIRCLE,
+            neutral: (largest - 1.0).abs() <= ON_CIRCLE,
+        }
     }
 
+    /// Whether a multiplier is outside the unit circle.
+    pub fn is_unstable(&self) -> bool {
+        !self.stable && !self.neutral
+    }
+
+    /// Modulus of the largest multiplier.
+    pub fn growth(&self) -> f64 {
+        self.multipliers.last().map_or(f64::NAN, modulus)
+    }
+
+    /// Number of multipliers outside the unit circle.
+    pub(super) fn outside(&self) -> usize {
+        let outside = |one: &&[f64; 2]| modulus(one) > 1.0 + ON_CIRCLE;
+        self.multipliers.iter().filter(outside).count()
+    }
+
+    /// Moduli of the four largest multipliers, ascending; NaN where there are fewer.
+    pub(super) fn largest_four(&self) -> [f64; 4] {
+        [3, 2, 1, 0].map(|n| self.multipliers.iter().rev().nth(n).map_or(f64::NAN, modulus))
+    }
+
+    /// A multiplier whose imaginary part has at least the size `imaginary` is within `distance` of the unit circle.
+    pub(super) fn on_circle(&self, imaginary: f64, distance: f64) -> bool {
+        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() >= imaginary);
+        pairs.any(|one| (modulus(one) - 1.0).abs() < distance)
+    }
+}
+
+/// An equation that selects a motion, in addition to the four that close it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Condition {
+    /// sigma has this value.
+    Sigma(f64),
+    /// G has this value.
+    Excitation(f64),
+    /// The first harmonic of the response has this phase, rad, relative to the reference, or the opposite one.
+    Phase(f64),
+    /// The part C of the first harmonic that has the phase `phase`, rad, and sigma lie on a line: the place of a curve that crosses it, also where
+    /// amplitude or frequency have an extremum.
+    Across {
+        /// The phase.
+        phase: f64,
+        /// C, over b, and sigma of a point of the line.
+        at: [f64; 2],
+        /// The normal of the line.
+        normal: [f64; 2],
+    },
+    /// A multiplier, or a pair of them, is on the unit circle.
+    Bifurcation(Bifurcation),
+    /// The unknowns lie in a plane: the end of a step along a curve.
+    Plane {
+        /// A point of the plane.
+        through: Unknowns,
+        /// Its normal, of length 1.
+        normal: Unknowns,
+    },
+}
+
+/// How stability changes at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Bifurcation {
+    /// A multiplier passes +1: the frequency response turns back.
+    #[serde(rename = "fold")]
+    Fold,
+    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
+    #[serde(rename = "symmetry breaking")]
+    SymmetryBreaking,
+    /// A multiplier of the whole period passes -1.
+    #[serde(rename = "period doubling")]
+    PeriodDoubling,
+    /// A complex pair leaves the unit circle: modulation begins where the motion was stable.
+    #[serde(rename = "Neimark-Sacker")]
+    NeimarkSacker,
+}
+
+/// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
+const MAP_DIFFERENCE: f64 = 1e-6;
+
+impl Bifurcation {
     /// As in a table.
-    pub fn name(&self) -> String {
-        let (impacts, periods) = (self.impacts(), self.periods());
-        match (impacts, periods) {
-            (2, 1) if self.mirrored => "symmetric 1:1".into(),
-            (2, 1) => "asymmetric 1:1".into(),
-            _ => {
-                let plural = |count: usize| if count == 1 { "" } else { "s" };
-                let mirrored = if self.mirrored { ", mirrored" } else { "" };
-                let (s, t) = (plural(impacts), plural(periods as usize));
-                format!("{impacts} impact{s} in {periods} period{t}{mirrored}")
+    pub fn name(&self) -> &'static str {
+        match self {
+            Bifurcation::Fold => "fold",
+            Bifurcation::SymmetryBreaking => "symmetry breaking",
+            Bifurcation::PeriodDoubling => "period doubling",
+            Bifurcation::NeimarkSacker => "Neimark-Sacker",
+        }
+    }
+
+    /// Zero where the multipliers of a map are on the unit circle as the bifurcation says, and smooth also where multipliers meet.
+    pub(super) fn test(self, map: &Matrix4<f64>) -> f64 {
+        match self {
+            Bifurcation::Fold => (map - Matrix4::identity()).determinant(),
+            Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (map + Matrix4::identity()).determinant(),
+            // The products of two multipliers are the eigenvalues of the second compound matrix.
+            Bifurcation::NeimarkSacker => {
+                let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+                let minor = |(a, b): (usize, usize), (c, d): (usize, usize)| {
+                    map[(a, c)] * map[(b, d)] - map[(a, d)] * map[(b, c)]
+                };
+                let compound = Matrix6::from_fn(|row, column| minor(pairs[row], pairs[column]));
+                (compound - Matrix6::identity()).determinant()
             }
         }
     }
-
-    /// The same pattern over a whole period, as after symmetry breaking.
-    pub fn doubled(&self) -> Self {
-        let mut walls = self.walls.clone();
-        if self.mirrored {
-            walls.extend(self.walls.iter().map(|wall| -wall));
-        } else {
-            walls.extend(&self.walls);
-        }
-        Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
-    }
-
-    /// Impacts over the whole period of the motion.
-    pub fn impacts(&self) -> usize {
-        self.walls.len() * if self.mirrored { 2 } else { 1 }
-    }
-
-    /// Periods of the base over the whole period of the motion.
-    pub fn periods(&self) -> u32 {
-        if self.mirrored {
-            self.half_periods
-        } else {
-            self.half_periods / 2
-        }
-    }
-
-    pub(super) fn sign(&self) -> f64 {
-        if self.mirrored { -1.0 } else { 1.0 }
-    }
-
-    pub(super) fn turn(&self) -> f64 {
-        f64::from(self.half_periods) * PI
-    }
 }
 
-/// State just after an impact. The base displacement is `epsilon G sin(phase)` there, and the particle is at `q1 - wall`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Bounce {
-    /// Phase of the base, rad; it grows from impact to impact.
-    pub phase: f64,
-    /// Displacement of the primary mass over b.
-    pub q1: f64,
-    /// Velocity of the primary mass over `b omega0`.
-    pub dq1: f64,
-    /// Velocity of the particle over `b omega0`.
-    pub dq2: f64,
-    /// The wall that was hit: +1 for w = +1, -1 for w = -1.
-    pub wall: f64,
-}
-
-impl Bounce {
-    fn vector(&self) -> Vector4<f64> {
-        Vector4::new(self.phase, self.q1, self.dq1, self.dq2)
+impl Condition {
+    /// The part of the first harmonic that has the phase `phase`, rad, has the amplitude `c`, over b.
+    pub(super) fn response(phase: f64, c: f64) -> Self {
+        Self::Across { phase, at: [c, 0.0], normal: [1.0, 0.0] }
     }
 
-    /// How far `later` is from repeating this state after the base has turned by `turn`, rad; with the sign -1, from its mirror image.
-    pub(super) fn apart(&self, later: &Bounce, turn: f64, sign: f64) -> Vector4<f64> {
-        let mut apart = later.vector() * sign - self.vector();
-        apart[0] = later.phase - self.phase - turn;
-        apart
-    }
-
-    /// Displacement of the particle over b.
-    pub fn q2(&self) -> f64 {
-        self.q1 - self.wall
-    }
-
-    /// (q1, q1', q2, q2').
-    fn state(&self) -> [f64; 4] {
-        [self.q1, self.dq1, self.q2(), self.dq2]
-    }
-}
-
-/// Angular frequency, rad/s, of a base at rest that takes its phase to the start in hardly any time.
-const AT_ONCE: f64 = 1e9;
-
-/// A plant in a state at a phase of its drive.
-pub(super) fn plant_at(parameters: &Parameters, state: State, drive: Drive, phase: f64) -> Option<Plant> {
-    let still = Drive::harmonic(0.0, AT_ONCE);
-    let mut plant = Plant::new(*parameters, state).ok()?;
-    plant.begin(still).ok()?;
-    plant.advance(still, phase.rem_euclid(TAU) / AT_ONCE).ok()?;
-    plant.begin(drive).ok()?;
-    plant.set_state(state).ok()?;
-    Some(plant)
-}
-
-/// Longest flight, periods.
-const LONGEST_FLIGHT: f64 = 64.0;
-
-/// The impacts of a motion of the dimensionless plant, one after another, each with the state after it. They end where the particle sticks, grazes a
-/// wall, or meets none within many periods.
-#[derive(Clone, Copy)]
-pub(super) struct Impacts {
-    plant: Plant,
-    drive: Drive,
-    phase: f64,
-}
-
-impl Impacts {
-    /// From a state (q1, q1', q2, q2') at a phase of the base.
-    pub(super) fn new(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Self> {
-        let (parameters, drive) = (
-            Parameters::dimensionless(scene.epsilon, scene.lambda, scene.r),
-            scene.drive(sigma),
-        );
-        let plant = plant_at(&parameters, state.into(), drive, phase).filter(|_| drive.omega > 0.0)?;
-        Some(Self { plant, drive, phase })
-    }
-
-    /// After an impact, from which the particle must move away.
-    pub(super) fn after(scene: &Dimensionless, sigma: f64, bounce: &Bounce) -> Option<Self> {
-        let leaves = (bounce.dq1 - bounce.dq2) * bounce.wall < 0.0;
-        Self::new(scene, sigma, bounce.phase, bounce.state()).filter(|_| leaves)
-    }
-
-    /// (q1, q1', q2, q2') after the time `t`.
-    pub(super) fn state(mut self, t: f64) -> Option<[f64; 4]> {
-        self.plant.advance(self.drive, t).ok()?;
-        Some(self.plant.state().into())
-    }
-}
-
-impl Iterator for Impacts {
-    type Item = (Event, Bounce);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let (omega, mut next) = (self.drive.omega, None);
-        let first = |event| {
-            next = Some(event);
-            ControlFlow::Break(())
+    /// The value of the equation and its derivative by the unknowns.
+    pub(super) fn value(&self, map: &mut impl ReturnMap, x: &Unknowns, here: &Return) -> (f64, RowVector6<f64>) {
+        let unit = |n: usize| RowVector6::from_fn(|_, column| f64::from(u8::from(column == n)));
+        // The harmonic and its derivatives, turned so that the part with a phase is real.
+        let turned = |phase: f64| {
+            let turned = Complex::from_polar(1.0, -phase);
+            (here.response * turned, here.response_by.map(|by| by * turned))
         };
-        self.plant
-            .advance_until(self.drive, LONGEST_FLIGHT * TAU / omega, first)
-            .ok()?;
-        let Some(event @ Event::Impact { t, wall, velocity }) = next else {
-            return None;
-        };
-        self.phase += omega * t;
-        let State { q1, dq1, dq2, .. } = self.plant.state();
-        let bounce = Bounce { phase: self.phase, q1, dq1, dq2, wall: wall.sign() };
-        (velocity.abs() > GRAZING * omega).then_some((event, bounce))
-    }
-}
-
-/// Derivative of four state variables by the unknowns, or by (phase, q1, q1', q2', Omega, G).
-pub(super) type ByAll = Matrix4x6<f64>;
-
-/// The return map of a pattern from one start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ReturnMap {
-    /// Closing error of the motion.
-    pub residual: Vector4<f64>,
-    /// Derivative of the residual by the unknowns.
-    pub by: ByAll,
-    /// First harmonic of the response relative to the reference: `Im(S exp(i phase))`.
-    pub s: Complex<f64>,
-    /// Derivative of the return map by the state: its eigenvalues are the multipliers.
-    pub monodromy: Matrix4<f64>,
-}
-
-/// Follows the pattern from the unknowns `x`: its return map, and `bounce` of each state after an impact, from the start to the last before the return,
-/// with the time of flight after it. None if the impacts have another pattern or graze.
-pub(super) fn follow(
-    scene: &Dimensionless,
-    pattern: &ImpactPattern,
-    x: &Unknowns,
-    mut bounce: impl FnMut(Bounce, f64),
-) -> Option<ReturnMap> {
-    let [phase, q1, dq1, dq2, sigma, g] = (*x).into();
-    let scene = Dimensionless { g, ..*scene };
-    let start = Bounce { phase, q1, dq1, dq2, wall: pattern.walls[0] };
-    let impacts = Impacts::after(&scene, sigma, &start)?;
-    let omega = impacts.drive.omega;
-    let mut variation = Variation::of(&impacts.plant);
-    let begun = Vector4::from(variation.rates());
-    let (mut at, mut sum, mut count) = (start, Complex::ZERO, 0);
-    let last = pattern.sign() * pattern.walls[0];
-    let walls = pattern.walls.iter().copied().skip(1).chain([last]);
-    for (wall, (event, next)) in walls.zip(impacts) {
-        let Event::Impact { t, velocity, .. } = event else {
-            return None;
-        };
-        if next.wall != wall {
-            return None;
+        match *self {
+            Condition::Sigma(sigma) => (x[4] - sigma, unit(4)),
+            Condition::Excitation(g) => (x[5] - g, unit(5)),
+            Condition::Phase(phase) => {
+                let (response, by) = turned(phase);
+                (response.im, by.map(|by| by.im).into())
+            }
+            Condition::Across { phase, at: [c, sigma], normal } => {
+                let (response, by) = turned(phase);
+                let by = RowVector6::from(by.map(|by| by.re)) * normal[0] + unit(4) * normal[1];
+                (normal[0] * (response.re - c) + normal[1] * (x[4] - sigma), by)
+            }
+            Condition::Plane { through, normal } => (normal.dot(&(x - through)), normal.transpose()),
+            Condition::Bifurcation(kind) => {
+                // Central differences; NaN where the pattern ends.
+                let mut at = |n: usize, step: f64| {
+                    let mut moved = *x;
+                    moved[n] += step;
+                    map.at(&moved).map_or(f64::NAN, |map| kind.test(&map.monodromy()))
+                };
+                let mut slope = |n: usize| (at(n, MAP_DIFFERENCE) - at(n, -MAP_DIFFERENCE)) / (2.0 * MAP_DIFFERENCE);
+                let slopes = RowVector6::from_fn(|_, n| slope(n));
+                (kind.test(&here.monodromy()), slopes)
+            }
         }
-        bounce(at, t);
-        variation.pass(&event, -variation.elapsed());
-        sum += Complex::from_polar(1.0, -next.phase)
-            * (-scene.epsilon * (1.0 + scene.r) / (1.0 + scene.epsilon) * velocity);
-        at = next;
-        count += 1;
     }
-    (count == pattern.walls.len()).then_some(())?;
-
-    let residual = start.apart(&at, pattern.turn(), pattern.sign());
-    let mut by = after_impact(&variation, begun, [omega, scene.epsilon]);
-    by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
-    let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
-    by.fixed_columns_mut::<4>(0)
-        .copy_from(&(monodromy - Matrix4::identity()));
-    by.column_mut(4).scale_mut(scene.epsilon);
-    let s = harmonic(&scene, omega, pattern, sum);
-    Some(ReturnMap { residual, by, s, monodromy })
 }
 
-/// Derivative of (phase, q1, q1', q2') after the impact that was passed last, by the same at the start, Omega and G. `begun` are the rates of
-/// (q1, q1', q2, q2') at the start.
-fn after_impact(variation: &Variation, begun: Vector4<f64>, [omega, epsilon]: [f64; 2]) -> ByAll {
-    let by = nalgebra::Matrix6x4::from(*variation.derivatives()).transpose();
-    let rates = Vector4::from(variation.rates());
-    let mut fixed = ByAll::from_columns(&[
-        (rates - by.fixed_columns::<4>(0) * begun) / omega,
-        by.column(0) + by.column(2),
-        by.column(1).into(),
-        by.column(3).into(),
-        by.column(4).into(),
-        by.column(5) * epsilon,
-    ]);
-    // At a fixed time the relative displacement is off the wall; at a fixed distance the time is off.
-    let early: RowVector6<f64> = (fixed.row(2) - fixed.row(0)) / (rates[0] - rates[2]);
-    fixed += rates * early;
-    let mut phase = early * omega;
-    phase[0] += 1.0;
-    phase[4] += variation.elapsed();
-    ByAll::from_rows(&[phase, fixed.row(0).into(), fixed.row(1).into(), fixed.row(3).into()])
+/// The equations of a motion: four that close it, and two that select it.
+pub(super) struct Closing<'a, M> {
+    pub map: &'a mut M,
+    pub conditions: [Condition; 2],
 }
 
-/// The first harmonic of the response relative to the reference, from the sum of the impulses over the map as phasors: the base through the
-/// oscillator, and the impulses through the oscillator and, for v, the particle.
-fn harmonic(scene: &Dimensionless, omega: f64, pattern: &ImpactPattern, sum: Complex<f64>) -> Complex<f64> {
-    let oscillator = ForcedOscillator::new(scene, omega);
-    let Definition { sensor, reference, .. } = scene.definition;
-    let turned = Complex::from_polar(1.0, -reference.phase(scene.epsilon * scene.lambda, omega));
-    // (2i/duration) times the response to a force through the oscillator, less the response of a free mass: the impulse on the
-    // particle is the opposite one.
-    let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
-    let particle = f64::from(u8::from(sensor == Sensor::V));
-    let inner = oscillator.free.stiffness(omega).inv() + particle / (omega * omega);
-    (oscillator.response(0.0) + weight * inner * sum) * turned
+impl<M: ReturnMap> Closing<'_, M> {
+    /// The solution near `guess`; None if the iteration leads to motions that do not return, or does not converge.
+    pub(super) fn solve(&mut self, guess: Unknowns) -> Option<Unknowns> {
+        newton(self, guess)
+    }
+}
+
+impl<M: ReturnMap> Equations<6> for Closing<'_, M> {
+    fn at(&mut self, x: &Unknowns) -> Option<(Unknowns, Matrix6<f64>)> {
+        let here = self.map.at(x)?;
+        let (mut residual, mut jacobian) = (Unknowns::zeros(), Matrix6::zeros());
+        residual.fixed_rows_mut::<4>(0).copy_from(&here.apart);
+        jacobian.fixed_rows_mut::<4>(0).copy_from(&here.closing());
+        for (row, condition) in [4, 5].into_iter().zip(self.conditions) {
+            let (value, by) = condition.value(self.map, x, &here);
+            residual[row] = value;
+            jacobian.set_row(row, &by);
+        }
+        let is_finite = residual.iter().chain(&jacobian).all(|value| value.is_finite());
+        is_finite.then_some((residual, jacobian))
+    }
+
+    fn restarted(&mut self, x: &Unknowns) -> Option<Unknowns> {
+        self.map.restarted(x)
+    }
 }

@@ -9,14 +9,15 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use lovines::oscillator::Oscillator;
-use lovines::{Excitation, Host, InvalidHost, Section};
+use lovines::{Excitation, Host, Section};
 use nalgebra::{Complex, Matrix2, Vector2};
 use serde::Serialize;
 
 use super::half_period::HalfPeriod;
-use super::periodic::{Bifurcation, wrapped};
+use super::periodic::wrapped;
+use super::return_map::{Bifurcation, Stability};
 use super::symmetric::{Interval, Particle, Reading, SymmetricMotion, SymmetricMotions, harmonic, intervals, search};
-use super::{AfterImpact, ON_CIRCLE, Orbit, stability};
+use super::{AfterImpact, Orbit};
 use crate::numerics::{self, Equations, equally_spaced, newton, try_bisection};
 use crate::oscillator::section;
 use crate::theory::SlowFlow;
@@ -43,12 +44,9 @@ pub struct StructureOrbit {
     pub impact_phase: f64,
     /// Where the orbit can be started.
     pub start: StructureStart,
-    /// Multipliers (real, imaginary) of the half-period map by rising modulus: two of every section, and two of the particle.
-    pub multipliers: Vec<[f64; 2]>,
-    /// All of them are inside the unit circle.
-    pub stable: bool,
-    /// The largest are on the unit circle, within 1e-7: disturbances neither grow nor decay.
-    pub neutral: bool,
+    /// By the half-period map, which has two multipliers of every section, and two of the particle.
+    #[serde(flatten)]
+    pub stability: Stability,
 }
 
 /// The state where the phase of the drive is 0, so that the drive is `sin(omega t)` times its amplitude from there on.
@@ -62,41 +60,13 @@ pub struct StructureStart {
     pub dq2: f64,
 }
 
-impl StructureStart {
-    /// Displacements and velocities of the coordinates of the host (its modes or degrees of freedom), to start a plant from.
-    pub fn coordinates(&self, host: &Host) -> Result<[Vec<f64>; 2], InvalidHost> {
-        let count = self.sections.len();
-        let point = |n: usize| {
-            let unit: Vec<f64> = (0..count).map(|other| f64::from(u8::from(other == n))).collect();
-            let parts = host.row(&unit)?.into_iter().zip(host.sections()).zip(&self.sections);
-            // The drive is 0 here.
-            let states = parts.map(|((pair, section), state)| section.at(pair, Vector2::from(*state)));
-            Ok(states.sum::<Vector2<f64>>())
-        };
-        let points = (0..count).map(point).collect::<Result<Vec<_>, InvalidHost>>()?;
-        Ok([0, 1].map(|part| points.iter().map(|point| point[part]).collect()))
-    }
-}
-
 impl StructureOrbit {
-    /// Modulus of the largest multiplier of half a period.
-    pub fn growth(&self) -> f64 {
-        self.multipliers.last().map_or(f64::NAN, |[re, im]| re.hypot(*im))
-    }
-
     /// This orbit in the numbers of an oscillator, which a base of the amplitude `base_per_drive`, m, drives as a unit drive does the host, and
     /// whose response is this one over `reading_per_response`. Of the multipliers the four largest.
     pub fn in_numbers(&self, d: &Dimensionless, base_per_drive: f64, reading_per_response: f64) -> Orbit {
         // Half a period later the particle is at the opposite point.
         let [q2, dq2] = [-FRAC_PI_2 * self.speed / self.omega / d.b, d.speed(self.speed)];
         let impact_velocity = d.speed(self.impact_velocity);
-        let moduli = self.multipliers.iter().rev().map(|[re, im]| re.hypot(*im));
-        let mut multipliers = [f64::NAN; 4];
-        multipliers
-            .iter_mut()
-            .rev()
-            .zip(moduli)
-            .for_each(|(multiplier, modulus)| *multiplier = modulus);
         Orbit {
             g: d.excitation(self.reference * base_per_drive),
             sigma: d.sigma(self.omega),
@@ -112,21 +82,10 @@ impl StructureOrbit {
                 q2,
                 dq2,
             },
-            multipliers,
-            stable: self.stable,
-            neutral: self.neutral,
+            multipliers: self.stability.largest_four(),
+            stable: self.stability.stable,
+            neutral: self.stability.neutral,
         }
-    }
-
-    /// Whether a multiplier is outside the unit circle.
-    pub fn is_unstable(&self) -> bool {
-        !self.stable && !self.neutral
-    }
-
-    /// Number of multipliers outside the unit circle.
-    fn unstable(&self) -> usize {
-        let outside = |[re, im]: &&[f64; 2]| re.hypot(*im) > 1.0 + ON_CIRCLE;
-        self.multipliers.iter().filter(outside).count()
     }
 }
 
@@ -156,19 +115,19 @@ impl StructureBranch {
     /// The stretches of stable orbits, and of neutral ones, each with the changes at its ends; `None` where the curve ends.
     pub fn stretches(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
         let mut from = 0;
-        let kind = |orbit: &StructureOrbit| [orbit.stable, orbit.neutral];
+        let kind = |orbit: &StructureOrbit| [orbit.stability.stable, orbit.stability.neutral];
         let runs = self.orbits.chunk_by(move |one, other| kind(one) == kind(other));
         let with_ends = runs.map(move |run| {
             let ends = [from, from + run.len()].map(|n| self.changes.iter().find(|change| change.after + 1 == n));
             from += run.len();
             (run, ends)
         });
-        with_ends.filter(|(run, _)| !run[0].is_unstable())
+        with_ends.filter(|(run, _)| !run[0].stability.is_unstable())
     }
 
     /// The stretches of stable orbits.
     pub fn stable(&self) -> impl Iterator<Item = (&[StructureOrbit], [Option<&StabilityChange>; 2])> {
-        self.stretches().filter(|(run, _)| run[0].stable)
+        self.stretches().filter(|(run, _)| run[0].stability.stable)
     }
 
     /// The stretches of stable orbits, with the orbits where they begin and end.
@@ -276,17 +235,6 @@ pub struct StructureFacts {
     pub alone: Vec<StructureBranch>,
     /// The backbone with all modes.
     pub all: Vec<StructureBranch>,
-}
-
-/// First-order theory of one mode of a structure.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstOrder {
-    /// The dimensionless numbers of the mode alone, without a drive; its response is the displacement of the cavity.
-    pub numbers: Dimensionless,
-    /// Amplitude of the base, m, that drives the oscillator of these numbers as a unit drive does the mode.
-    pub base_per_drive: f64,
-    /// Amplitude of the response over the amplitude of the cavity.
-    pub response_per_cavity: f64,
 }
 
 /// The symmetric 1:1 orbits of a structure with a particle in a cavity.
@@ -424,8 +372,8 @@ impl StructureOrbits {
     /// Frequencies from `low` to `high`, equally spaced far from the modes, and ever closer towards each: the orbits of a mode with a small mass ratio
     /// epsilon are within some epsilon of its frequency.
     fn grid(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
-        let modes = (0..self.sections.len()).filter_map(|n| self.first_order(n));
-        let modes: Vec<_> = modes.map(|mode| (mode.numbers.omega0, mode.numbers.epsilon)).collect();
+        let modes = (0..self.sections.len()).filter_map(|n| self.numbers(n));
+        let modes: Vec<_> = modes.map(|mode| (mode.omega0, mode.epsilon)).collect();
         let next = move |omega: f64| {
             let distances = modes
                 .iter()
@@ -460,46 +408,28 @@ impl StructureOrbits {
         })
     }
 
-    /// What each section and, last, the particle contribute to the disturbance of an orbit that grows fastest or decays slowest: shares
-    /// of its energy.
-    ///
-    /// The disturbance is an eigenvector of the half-period map. The displacement of a section without a natural frequency, as the
-    /// particle is, counts as at the frequency of the orbit.
-    pub fn shares(&self, orbit: &StructureOrbit) -> Option<Vec<f64>> {
-        self.shares_of(orbit, *orbit.multipliers.last()?)
-    }
-
-    /// First-order theory of the section `n` alone; `None` unless it oscillates and the cavity and the drive reach it.
-    pub fn first_order(&self, n: usize) -> Option<FirstOrder> {
+    /// The dimensionless numbers of the section `n` alone, without a drive; its response is the displacement of the cavity. `None` unless it
+    /// oscillates and the cavity and the drive reach it.
+    pub fn numbers(&self, n: usize) -> Option<Dimensionless> {
         let section = self.sections.get(n)?;
         let Particle { mass, half_width, restitution } = self.particle;
-        let Oscillator { delta, omega0, omega0_squared, .. } = section.oscillator;
+        let Oscillator { delta, omega0, .. } = section.oscillator;
         let epsilon = mass * section.velocity_per_impulse(section.cavity);
-        let [cavity, response] = [None, self.response.as_ref()].map(|rows| {
-            let row = rows.map_or(section.cavity, |rows| rows[n]);
-            harmonic(row, section.driven(omega0)).norm()
-        });
-        if !(delta < omega0 && epsilon > 0.0 && cavity > 0.0) {
-            return None;
-        }
+        let is_driven = harmonic(section.cavity, section.driven(omega0)).norm() > 0.0;
         let reference = match self.excitation {
             Excitation::Force => Reference::Force,
             Excitation::Base => Reference::Base,
         };
-        Some(FirstOrder {
-            numbers: Dimensionless {
-                omega0,
-                b: half_width,
-                definition: Definition {
-                    reference,
-                    sensor: Sensor::Q1,
-                    phase: self.target,
-                    ..Definition::default()
-                },
-                ..Dimensionless::new(epsilon, 2.0 * delta / (epsilon * omega0), restitution, 0.0)
+        (delta < omega0 && epsilon > 0.0 && is_driven).then(|| Dimensionless {
+            omega0,
+            b: half_width,
+            definition: Definition {
+                reference,
+                sensor: Sensor::Q1,
+                phase: self.target,
+                ..Definition::default()
             },
-            base_per_drive: cavity / omega0_squared.hypot(2.0 * delta * omega0),
-            response_per_cavity: response / cavity,
+            ..Dimensionless::new(epsilon, 2.0 * delta / (epsilon * omega0), restitution, 0.0)
         })
     }
 
@@ -539,7 +469,7 @@ impl StructureOrbits {
     /// beyond which symmetric motions are unstable.
     pub fn range(&self, driven: usize, points: usize) -> Option<StructureRange> {
         const FASTEST_PARTICLE: f64 = 1.5;
-        let Dimensionless { omega0, b, epsilon, lambda, r, definition, .. } = self.first_order(driven)?.numbers;
+        let Dimensionless { omega0, b, epsilon, lambda, r, definition, .. } = self.numbers(driven)?;
         let flow = SlowFlow::new(lambda, r);
         let detunings = equally_spaced(0.0, FASTEST_PARTICLE, FEWEST_FREQUENCIES)
             .map(|speed| flow.detuning_at(speed, definition.off_resonance()));
@@ -614,9 +544,7 @@ impl StructureOrbits {
             impact_velocity: motion.impact_velocity,
             impact_phase: motion.drive.arg(),
             start: StructureStart { sections: Vec::new(), q2: f64::NAN, dq2: f64::NAN },
-            multipliers: Vec::new(),
-            stable: false,
-            neutral: false,
+            stability: Stability::default(),
         }
     }
 
@@ -633,8 +561,6 @@ impl StructureOrbits {
         if !with_stability {
             return Some(orbit);
         }
-        let multipliers = half.multipliers();
-        let [stable, neutral] = stability(multipliers.last()?.norm());
         let (t, sign) = since_impact(motion);
         let state = |(section, impulsive): (&Section, Vector2<f64>)| {
             let impulsive = section.propagator(t) * impulsive * sign;
@@ -653,9 +579,7 @@ impl StructureOrbits {
                 q2: sign * (q2 + motion.speed * t),
                 dq2: sign * motion.speed,
             },
-            stable,
-            neutral,
-            multipliers: multipliers.iter().map(|one| [one.re, one.im]).collect(),
+            stability: half.stability(),
             ..orbit
         })
     }
@@ -760,16 +684,21 @@ impl StructureOrbits {
         (from, first): (f64, &StructureOrbit),
         (to, second): (f64, &StructureOrbit),
     ) -> Option<StabilityChange> {
-        let outside = first.unstable();
-        if outside == second.unstable() {
+        let outside = first.stability.outside();
+        if outside == second.stability.outside() {
             return None;
         }
         let at = |angle: f64| at(angle, true);
-        let like_first = |angle: f64| at(angle).map(|orbit| orbit.unstable() == outside).ok_or(());
+        let like_first = |angle: f64| at(angle).map(|orbit| orbit.stability.outside() == outside).ok_or(());
         let (before, beyond) = try_bisection(from, to, LOCATION_WIDTH, like_first).ok()?;
         // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
-        let orbit = at(if outside < second.unstable() { beyond } else { before })?;
-        let multiplier = *orbit.multipliers.get(orbit.multipliers.len() - orbit.unstable())?;
+        let orbit = at(if outside < second.stability.outside() {
+            beyond
+        } else {
+            before
+        })?;
+        let multipliers = &orbit.stability.multipliers;
+        let multiplier = *multipliers.get(multipliers.len() - orbit.stability.outside())?;
         let kind = match multiplier {
             [_, im] if im != 0.0 => Bifurcation::NeimarkSacker,
             [re, _] if re > 0.0 => Bifurcation::Fold,

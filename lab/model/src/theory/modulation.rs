@@ -18,13 +18,6 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use super::slow_flow::{BranchSide, SlowFlow};
 
 impl SlowFlow {
-    /// Phase psi of the triangle wave on the manifold at the particle speed `b` and the phase `gamma` of v, rad:
-    /// `C cos(pi/2 - psi + gamma) = R B`, `C sin(pi/2 - psi + gamma) = 1 - pi B/2` (docs/theory.md, eq. 4).
-    pub fn psi(&self, b: f64, gamma: f64) -> f64 {
-        let impact = (1.0 - FRAC_PI_2 * b).atan2(self.manifold.dissipation * b);
-        gamma + FRAC_PI_2 - impact
-    }
-
     /// Change of the detuning of phase resonance by a slow drift at the amplitude `c` on the right branch, per unit of `dC/dtau`. `None` at the
     /// fold and below.
     pub fn drift(&self, c: f64) -> Option<f64> {

@@ -212,6 +212,13 @@ fn elastic_impacts_have_no_solution_without_amplitude() {
 
 // Motions off the manifold, impact by impact.
 
+/// Phase psi of the triangle wave on the manifold at the particle speed `b` and the phase `gamma` of v, rad:
+/// `C cos(pi/2 - psi + gamma) = R B`, `C sin(pi/2 - psi + gamma) = 1 - pi B/2` (docs/theory.md, eq. 4).
+fn psi(flow: &SlowFlow, b: f64, gamma: f64) -> f64 {
+    let impact = (1.0 - FRAC_PI_2 * b).atan2(flow.manifold.dissipation * b);
+    gamma + FRAC_PI_2 - impact
+}
+
 #[test]
 fn the_jumps_linearised_are_the_half_period_map() {
     for (r, b) in [(0.65, 0.7), (0.65, 0.9), (0.65, 1.2), (0.9, 0.8), (0.3, 0.5)] {
@@ -223,7 +230,7 @@ fn the_jumps_linearised_are_the_half_period_map() {
             let next = walk.next().expect("an impact");
             [next.b, next.psi]
         };
-        let [by_b, by_psi] = jacobian([b, flow.psi(b, gamma)], map);
+        let [by_b, by_psi] = jacobian([b, psi(&flow, b, gamma)], map);
         let [trace, determinant] = half_period_map(r, b);
         close(by_b[0] + by_psi[1], trace, 1e-7);
         close(by_b[0] * by_psi[1] - by_b[1] * by_psi[0], determinant, 1e-7);
@@ -238,7 +245,7 @@ fn distance_from_slow_flow(epsilon: f64) -> f64 {
         epsilon,
         (0.0, 0.0),
         (flow.manifold.c(1.0), 0.0),
-        (1.05, flow.psi(1.0, 0.0)),
+        (1.05, psi(&flow, 1.0, 0.0)),
     );
     let decay = flow.decay(1.0, 20_001).unwrap();
     let walk = walk
@@ -263,7 +270,7 @@ fn past_the_fast_approach_the_impacts_follow_the_slow_flow_to_first_order_down_t
         1e-3,
         (0.0, 0.0),
         (flow.manifold.c(b), 0.0),
-        (b, flow.psi(b, 0.0)),
+        (b, psi(&flow, b, 0.0)),
     );
     let last = walk.take(100_000).last().unwrap();
     assert!(last.tau < 50_000.0 * PI, "it never ends");
@@ -277,7 +284,7 @@ fn a_walk_beside_an_equilibrium_leads_to_it() {
     let one = equilibria
         .find(|one| one.impacts_stable && one.slow_flow_stable)
         .unwrap();
-    let beside = (one.b, flow.psi(one.b, one.gamma));
+    let beside = (one.b, psi(&flow, one.b, one.gamma));
     for start in [(one.c, one.gamma), (1.02 * one.c, one.gamma + 0.05)] {
         let last = modulation(&flow, epsilon, drive, start, beside)
             .take(4_000)
