@@ -156,7 +156,7 @@ pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
 
 /// Resolution of a stated point: of response and drive, relative, and of the frequency over the half-power bandwidth. No sensor and no drawing shows
 /// more.
-pub const POINT_RESOLUTION: f64 = 1e-4;
+const POINT_RESOLUTION: f64 = 1e-4;
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
