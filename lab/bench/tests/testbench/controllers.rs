@@ -2,38 +2,17 @@
 //! asked for.
 
 use std::cell::Cell;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use phase_lock::Config;
 use vines_bench::experiment::{self, ExperimentError};
 use vines_bench::identification::{DecayEnd, Identification, IdentificationError, identify};
 use vines_bench::loop_check::check;
 use vines_bench::record::Record;
-use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Sensors, Simulated};
+use vines_bench::rig::{Command, Drive, Rig, Sensors, Simulated};
 use vines_bench::scene::Scene;
 
-use super::{Altered, paper};
-
-/// The built-in controller with another answer, and without the control of the response. It does not say whether it has locked.
-struct Foreign<F> {
-    built_in: BuiltIn,
-    change: F,
-    asked: Asked,
-}
-
-/// What a controller is asked for: whether to drive, and for how many samples it has been asked this.
-type Asked = (bool, usize);
-
-impl<F: FnMut(&mut Command, Asked)> Controller for Foreign<F> {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        let (before, samples) = self.asked;
-        self.asked = (active, if before == active { samples + 1 } else { 0 });
-        let command = self.built_in.sample(sensors, active)?;
-        let mut command = Command { settled: None, state: None, ..command };
-        (self.change)(&mut command, self.asked);
-        Ok(command)
-    }
-}
+use super::{Altered, Asked, Foreign, paper};
 
 /// Settings of a run whose decay is short.
 const SHORT: &str = "record.decay_periods=30";
@@ -46,23 +25,20 @@ fn scene(settings: &[&str]) -> Scene {
 fn run(
     scene: &Scene,
     configure: impl FnOnce(Config) -> Config,
-    change: impl FnMut(&mut Command, Asked),
+    mut change: impl FnMut(&mut Command, Asked),
 ) -> (Result<Record, ExperimentError>, [f64; 2]) {
-    let last = Cell::new([f64::NAN; 2]);
-    let drive = |drive: Drive, step| {
-        last.set([drive.amplitude, drive.displacement]);
+    let mut last = [f64::NAN; 2];
+    let mut rig = Altered::driven(scene, |drive, step| {
+        last = [drive.amplitude, drive.displacement];
         (drive, step)
-    };
-    let mut rig = Altered {
-        rig: Simulated::of(scene).unwrap(),
-        read: Box::new(Ok),
-        drive: Box::new(drive),
-    };
-    let built_in = BuiltIn::new(&configure(scene.controller_config())).unwrap();
-    let mut controller = Foreign { built_in, change, asked: (true, 0) };
+    });
+    let mut controller = Foreign::new(&configure(scene.controller_config()), |command: &mut Command, asked| {
+        change(command, asked);
+        Ok(())
+    });
     let record = experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
     drop(rig);
-    (record, last.get())
+    (record, last)
 }
 
 #[test]
@@ -175,18 +151,14 @@ fn identified_on(
         };
         (if driven && is_off { goes_on } else { drive }, step)
     };
-    let mut rig = Altered {
-        rig: Simulated::of(scene).unwrap(),
-        read: Box::new(|sensors| Ok(read(sensors))),
-        drive: Box::new(drive),
-    };
+    let mut rig = Altered { drive: Box::new(drive), ..Altered::reading(scene, &mut read) };
     identify(&super::record(&mut rig, scene).unwrap(), &scene.plan())
 }
 
 #[test]
-fn a_decay_begins_where_the_measured_base_rests_within_the_noise_of_its_channel() {
+fn a_lock_is_at_the_requested_drive_and_its_decay_begins_where_the_base_rests_also_through_noise() {
     let floor = 1e-3 * scene(&[]).amplitude;
-    for snr in ["chain.snr=none", "chain.snr=40"] {
+    for snr in ["chain.snr=none", "chain.snr=60", "chain.snr=40"] {
         let scene = scene(&[snr]);
         let period = scene.plan().knowledge.samples(1.0) as f64;
         // A base that goes on has no free decay.
@@ -204,6 +176,11 @@ fn a_decay_begins_where_the_measured_base_rests_within_the_noise_of_its_channel(
         for (periods, [earliest, latest]) in [(0.0, [0.0, 0.2]), (10.0, [9.0, 10.5])] {
             let fades = |since: f64| (1.0 - since / (periods * period + 1.0)).max(0.0);
             let found = identified_on(&scene, fades, |sensors| sensors).unwrap();
+            assert!(
+                found.lock.at_requested_drive && found.decay.end != DecayEnd::Driven,
+                "{snr}: {:?}",
+                found.lock
+            );
             // A point is the middle of its window of 2.5 periods.
             let first = found.decay.points[0].t_s / scene.dimensionless().natural_period() - 1.25;
             assert!((earliest..=latest).contains(&first), "{snr}, {periods}: {first}");
@@ -282,42 +259,38 @@ fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
 }
 
 #[test]
-fn a_lock_at_the_requested_drive_and_phase_says_so_through_noise() {
-    for snr in ["chain.snr=none", "chain.snr=60", "chain.snr=40"] {
-        let scene = scene(&[snr]);
-        let (record, _) = run(&scene, |config| config, |_, _| ());
-        let found = identify(&record.unwrap(), &scene.plan()).unwrap();
-        let (at, requested) = (found.lock.at, found.lock.requested_e_m);
-        assert!(
-            found.lock.at_requested_drive,
-            "{snr}: {} ± {} m, {requested} m",
-            at.e_m, at.u_e_m
-        );
-        assert!(TAU * at.f_hz > 0.0 && found.decay.end != DecayEnd::Driven);
-    }
-}
-
-#[test]
-fn a_loop_check_does_not_cut_the_stinger() {
-    let text = include_str!("../../../../scenes/shaker-cantilever.toml");
-    let scene = super::common::scene(text, &["shaker.release=cut", "start.dq2=0"]).unwrap();
-    let force = |is_checked: bool| {
-        let mut rig = Simulated::of(&scene).unwrap();
-        if is_checked {
-            check(rig.as_mut(), &scene.plan()).unwrap();
-        }
-        let drive = Drive {
-            omega: scene.dimensionless().omega0,
-            amplitude: scene.knowledge().target.units.command.of_metres(1e-6),
-            displacement: 0.0,
+fn neither_a_loop_check_nor_a_held_sample_of_zero_cuts_the_stinger() {
+    let scene = super::preset("shaker-cantilever", &["shaker.release=cut", "start.dq2=0"]).unwrap();
+    let (omega, step) = (scene.dimensionless().omega0, scene.sample_time());
+    // The largest force in 200 samples, in which every tenth drive is zero where samples are held.
+    let force = |rig: &mut dyn Rig, amplitude: f64, holds: bool| {
+        let amplitude = scene.knowledge().target.units.command.of_metres(amplitude);
+        let sample = |n: u32| {
+            let sine = if n.is_multiple_of(10) {
+                0.0
+            } else {
+                (0.06 * f64::from(n)).sin()
+            };
+            let displacement = if holds { amplitude * sine } else { 0.0 };
+            let drive = Drive { omega, amplitude, displacement };
+            let driven = if holds {
+                rig.hold(drive, step)
+            } else {
+                rig.advance(drive, step)
+            };
+            driven.and_then(|()| rig.sense()).unwrap().reference.unwrap().abs()
         };
-        let mut largest = 0.0_f64;
-        for _ in 0..200 {
-            rig.advance(drive, scene.sample_time()).unwrap();
-            largest = largest.max(rig.sense().unwrap().reference.unwrap().abs());
-        }
-        largest
+        (0..200).map(sample).fold(0.0, f64::max)
     };
-    let [fresh, checked] = [false, true].map(force);
+    let mut rig = Simulated::of(&scene).unwrap();
+    check(rig.as_mut(), &scene.plan()).unwrap();
+    let checked = force(&mut *rig, 1e-6, false);
+    let mut rig = Simulated::of(&scene).unwrap();
+    let fresh = force(&mut *rig, 1e-6, false);
     assert!((checked / fresh - 1.0).abs() < 0.5, "{fresh:e} {checked:e} N");
+    let [driven, again, released] = [1e-6, 1e-6, 0.0].map(|amplitude| force(&mut *rig, amplitude, true));
+    assert!(
+        again > 0.1 * driven && released < 1e-6 * driven,
+        "{driven:e} {again:e} {released:e}"
+    );
 }

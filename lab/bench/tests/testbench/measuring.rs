@@ -4,7 +4,6 @@
 
 use std::cell::Cell;
 use std::f64::consts::TAU;
-use std::path::Path;
 
 use lovines::{Restitution, State};
 use phase_lock_f32 as single;
@@ -25,7 +24,7 @@ use vines_model::numerics::{Estimate, mean_square};
 use vines_model::orbit::phase_resonant;
 
 use super::common::{self, crossings, noisy, rig_with_stable_orbit, uniform};
-use super::{Altered, checked, identified, paper, record, tracked};
+use super::{Altered, checked, identified, paper, preset, record, record_of, tracked, tracked_of};
 
 /// The dimensionless default scene with these settings.
 fn dimensionless(settings: &[&str]) -> Scene {
@@ -262,10 +261,7 @@ fn an_asymmetric_motion_is_none_of_noise_whatever_the_sensor_measures() {
         "backbone.C_from=0.75",
         "backbone.points=1",
     ]);
-    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-    let [level] = &levels.points[..] else {
-        panic!("{levels:?}")
-    };
+    let level = tracked_of(&scene).points[0];
     assert_eq!(
         [Some(level.regime), level.regime_by_impacts],
         [Some(Regime::Asymmetric); 2]
@@ -278,8 +274,7 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
     let rig = ["plant.m=0.04993", "plant.c=5.044", "plant.r=0.805", "backbone.points=1"];
     for reference in ["chain.reference=true", "chain.reference=false"] {
         let scene = paper(&[&rig[..], &[reference]].concat());
-        let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-        let at = levels.points[0].at;
+        let at = tracked_of(&scene).points[0].at;
         let [sigma, _] = ExactCurve::of(&scene.dimensionless()).at(at.c).unwrap();
         assert!(
             (at.sigma - sigma).abs() < 3.0 * at.u_sigma,
@@ -289,7 +284,7 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
 }
 
 #[test]
-fn noise_behind_an_anti_alias_filter_keeps_neither_a_lock_nor_a_level_from_settling() {
+fn neither_noise_behind_a_filter_nor_an_accelerometer_of_a_base_whose_drive_changes_keeps_the_loop_from_settling() {
     let curve = ExactCurve::of(&dimensionless(&[]).dimensionless());
     for settings in [
         "chain.filter=10 chain.snr=40",
@@ -304,33 +299,19 @@ fn noise_behind_an_anti_alias_filter_keeps_neither_a_lock_nor_a_level_from_settl
             "{settings}: {distance:?}, {filtered:?}"
         );
     }
-    let scene = paper(&[
-        "chain.filter=10",
-        "chain.snr=40",
-        "backbone.points=2",
-        "backbone.C_to=0.4",
-    ]);
-    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-    assert!(levels.points.iter().all(|point| point.settled), "{:?}", levels.points);
-}
-
-#[test]
-fn what_an_accelerometer_of_the_base_shows_of_a_change_of_the_drive_does_not_keep_the_loop_from_its_phase() {
-    // The drive is asked to change before the last change is forgotten.
-    let scene = paper(&[
-        "plant.m=0.05061",
-        "plant.c=2.711",
-        "plant.r=0.706",
-        "excitation.G=1.365",
-        "resonance.sensor=q1",
-        "resonance.sensor_quantity=velocity",
-        "resonance.reference_quantity=acceleration",
-        "controller.samples_per_period=400",
-        "backbone.C_from=0.56",
-        "backbone.points=1",
-    ]);
-    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-    assert!(levels.points.iter().all(|point| point.settled), "{:?}", levels.points);
+    for settings in [
+        "chain.filter=10 chain.snr=40 backbone.points=2 backbone.C_to=0.4",
+        // The drive is asked to change before the accelerometer of the base has forgotten the last change.
+        "plant.m=0.05061 plant.c=2.711 plant.r=0.706 excitation.G=1.365 resonance.sensor=q1 resonance.sensor_quantity=velocity \
+         resonance.reference_quantity=acceleration controller.samples_per_period=400 backbone.C_from=0.56 backbone.points=1",
+    ] {
+        let levels = tracked_of(&paper(&settings.split_whitespace().collect::<Vec<_>>()));
+        assert!(
+            levels.points.iter().all(|point| point.settled),
+            "{settings}: {:?}",
+            levels.points
+        );
+    }
 }
 
 /// A rig without an input for samples of the base, counting what it reads.
@@ -583,10 +564,9 @@ fn difficult_rigs_lock_from_rest_on_their_symmetric_motion() {
 #[test]
 fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
     for name in ["skewed", "rough", "viscoelastic", "vertical"] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/{name}.toml"));
-        let scene = Scene::load(Some(&path), &["record.decay_periods=3".parse().unwrap()]).unwrap();
+        let scene = preset(name, &["record.decay_periods=3"]).unwrap();
         assert_eq!(scene.start, State::default(), "{name} does not start from rest");
-        let record = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+        let record = record_of(&scene);
         let lock = identify(&record, &scene.plan()).unwrap().lock;
         let expected = if name == "vertical" {
             Regime::Asymmetric
@@ -624,41 +604,21 @@ fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
     }
 }
 
-#[test]
-fn a_particle_that_sticks_is_counted_and_timed() {
-    // With this much friction the particle rides on the floor for a part of every period.
-    let scene = paper(&["plant.mu_k=0.4", "excitation.G=2", "start.dq2=1.0"]);
-    let mut rig = Simulated::of(&scene).unwrap();
-    let omega = 0.98 * scene.dimensionless().omega0;
-    let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
-    for _ in 0..5000 {
-        rig.advance(drive, scene.sample_time()).unwrap();
-    }
-    let friction = rig.ground_truth().unwrap().unwrap().friction.unwrap();
-    assert!(friction.sticks > 1 && friction.loss > 0.0, "{friction:?}");
-    let share = friction.stuck_time / (5000.0 * scene.sample_time());
-    assert!(share > 0.0 && share < 0.5, "{friction:?}");
-}
-
 // Foreign tones on the response sensor.
 
 /// The rig of a scene without ground truth, whose response sensor reads tones, too: hertz and metres.
 fn rig<'a>(scene: &Scene, tones: &'a [(f64, f64)]) -> Altered<'a> {
     let (step, mut time) = (scene.sample_time(), 0.0);
-    let read = move |sensors: Sensors| {
+    let shown = Altered::reading(scene, move |sensors: Sensors| {
         let tones = tones
             .iter()
             .map(|(hertz, size)| size * (TAU * hertz * time + 1.0).sin());
         let response = sensors.response + tones.sum::<f64>();
         time += step;
-        Ok(Sensors { response, ..sensors })
-    };
+        Sensors { response, ..sensors }
+    });
     let rig = SensorsOnly::around(Simulated::of(scene).unwrap());
-    Altered {
-        rig: Box::new(rig),
-        read: Box::new(read),
-        drive: Box::new(|drive, step| (drive, step)),
-    }
+    Altered { rig: Box::new(rig), ..shown }
 }
 
 /// Mains hum and a ripple with harmonics: hertz, and share of a response of C = 0.55.
@@ -766,14 +726,12 @@ fn a_response_that_repeats_after_two_to_four_periods_is_not_called_1_1_also_thro
             let turns = Cell::new(0.0);
             // The impacts stay even: only the response shows it.
             let line = |turns: f64| 5e-4 * scene.plant.half_width * (TAU * turns / periods as f64).sin();
-            let mut rig = Altered {
-                rig: Simulated::of(&scene).unwrap(),
-                read: Box::new(|sensors| Ok(Sensors { response: sensors.response + line(turns.get()), ..sensors })),
-                drive: Box::new(|drive, step| {
-                    turns.set(turns.get() + drive.omega * step / TAU);
-                    (drive, step)
-                }),
+            let drive = |drive: Drive, step| {
+                turns.set(turns.get() + drive.omega * step / TAU);
+                (drive, step)
             };
+            let read = |sensors: Sensors| Sensors { response: sensors.response + line(turns.get()), ..sensors };
+            let mut rig = Altered { drive: Box::new(drive), ..Altered::reading(&scene, read) };
             let found = identify(&record(&mut rig, &scene).unwrap(), &scene.plan());
             let is_named = matches!(found, Err(IdentificationError::Subharmonic { periods: n, .. }) if n == periods);
             assert!(is_named, "{periods}: {found:?}");
