@@ -147,7 +147,6 @@ fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let direct = identified("--rig built-in");
     let rig = Server::start("rig --json --silence 5");
     let done = run(&format!("identify --json --rig {}", rig.1));
-    assert!((sigma(&json(&done)) - sigma(&direct)).abs() < 5e-3);
     let report: Value = serde_json::from_str(&rig.report()).unwrap();
     println!("{report}");
     assert_eq!(report["ended"], "farewell");
@@ -159,6 +158,11 @@ fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let late = missed.as_u64().max(held.as_u64()).unwrap();
     let (message, code) = (text(&done), done.status.code());
     assert!([Some(0), Some(3)].contains(&code), "{message}");
+    // On a machine that is too busy for it, the results are doubtful.
+    assert!(
+        code == Some(3) || (sigma(&json(&done)) - sigma(&direct)).abs() < 5e-3,
+        "{message}"
+    );
     assert!(late > 0 || code == Some(0), "{message}");
     let few = late * 90 < counted;
     assert!(few || code == Some(3), "{late} of {counted}, {code:?}: {message}");

@@ -1,9 +1,11 @@
 //! Guards the bench without its fit. Each file has the tests of one part; what several of them need is here.
 
+mod backbone;
 #[path = "../../../../studies/common.rs"]
 mod common;
 mod controllers;
 mod faults;
+mod identification;
 mod loop_check;
 mod measuring;
 mod scenes;
@@ -25,6 +27,11 @@ use vines_bench::scene::{Override, Scene, SceneError};
 /// The default scene with these settings.
 fn paper(settings: &[&str]) -> Scene {
     common::scene("", settings).unwrap()
+}
+
+/// The dimensionless scene with these settings, which spaces separate.
+fn dimensionless(settings: &str) -> Scene {
+    preset("dimensionless", &settings.split_whitespace().collect::<Vec<_>>()).unwrap()
 }
 
 /// A preset of `scenes/` with these settings.

@@ -24,12 +24,10 @@ use vines_model::numerics::{Estimate, mean_square};
 use vines_model::orbit::phase_resonant;
 
 use super::common::{self, crossings, noisy, rig_with_stable_orbit, uniform};
-use super::{Altered, checked, identified, paper, preset, record, record_of, tracked, tracked_of};
-
-/// The dimensionless default scene with these settings.
-fn dimensionless(settings: &[&str]) -> Scene {
-    common::scene(include_str!("../../../../scenes/dimensionless.toml"), settings).unwrap()
-}
+use super::structures::BEAM;
+use super::{
+    Altered, changed, checked, dimensionless, identified, paper, preset, record, record_of, tracked, tracked_of,
+};
 
 /// The lock of an experiment with the plant of a scene.
 fn lock(scene: &Scene) -> Lock {
@@ -125,28 +123,15 @@ fn the_noise_of_a_sensor_is_the_same_at_rest_at_a_hundredth_of_the_drive_at_the_
     let by_force = paper(&["chain.snr=40", "resonance.reference=force"]);
     are(&noise_of(&by_force), [2.828e-5, 7.071e-3 * drive]);
     // Behind the force of 1.2 N on a structure, whose sensor reads a third of the motion at the cavity.
-    let structure = common::scene(FORCED, &["chain.snr=40"]).unwrap();
+    let structure = forced(&["chain.snr=40"]);
     are(&noise_of(&structure), [2.828e-5 / 3.0, 7.071e-3 * 1.2]);
 }
 
-/// A beam under a force, whose sensor reads a third of the motion at the cavity.
-const FORCED: &str = "\
-[plant]
-m = 0.032
-b = 0.01
-r = 0.65
-[structure]
-excitation = \"force\"
-cavity = \"tip\"
-sensor = \"middle\"
-drive = \"root\"
-modes = [
-    { frequency = 8.8156, damping = 0.006, shape = { root = 0.1, tip = 0.51, middle = 0.17 } },
-    { frequency = 55.274, damping = 0.006, shape = { root = 0.3, tip = -0.51, middle = 0.4 } },
-]
-[excitation]
-F = 1.2
-";
+/// The beam under its force, whose sensor reads a third of the motion at the cavity.
+fn forced(settings: &[&str]) -> Scene {
+    let sensor = "drive = -> sensor = \"middle\"\ndrive = ;; 0.51252 -> 0.51 ;; middle = 0.0 -> middle = 0.17";
+    common::scene(&changed(BEAM, sensor), settings).unwrap()
+}
 
 #[test]
 fn keys_in_si_units_replace_the_noise_of_their_channel_whatever_it_measures() {
@@ -174,17 +159,12 @@ fn keys_in_si_units_replace_the_noise_of_their_channel_whatever_it_measures() {
     are(&noisy(&by_force), [0.0, 0.02 / 11_680.84]);
     // As stated, in the units of the channels of a structure.
     let settings = ["chain.response_noise=1e-5", "chain.reference_noise=0.02"];
-    let structure = common::scene(FORCED, &settings).unwrap();
-    are(&noise_of(&structure), [1e-5, 0.02]);
+    are(&noise_of(&forced(&settings)), [1e-5, 0.02]);
 }
 
 /// The lock behind the chain of a scene, held for 200 periods.
 fn at(settings: &str) -> Result<ResonancePoint, ExperimentError> {
-    let settings: Vec<&str> = ["record.hold_periods=200"]
-        .into_iter()
-        .chain(settings.split_whitespace())
-        .collect();
-    let scene = dimensionless(&settings);
+    let scene = dimensionless(&format!("record.hold_periods=200 {settings}"));
     let record = record(&mut *Simulated::of(&scene).unwrap(), &scene)?;
     Ok(identify(&record, &scene.plan()).unwrap().lock.at)
 }
@@ -285,7 +265,7 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
 
 #[test]
 fn neither_noise_behind_a_filter_nor_an_accelerometer_of_a_base_whose_drive_changes_keeps_the_loop_from_settling() {
-    let curve = ExactCurve::of(&dimensionless(&[]).dimensionless());
+    let curve = ExactCurve::of(&dimensionless("").dimensionless());
     for settings in [
         "chain.filter=10 chain.snr=40",
         "chain.filter=4 chain.snr=40",
@@ -330,7 +310,7 @@ impl Rig for Counter {
 
 #[test]
 fn a_delay_keeps_the_order_of_both_sensors_and_held_samples_need_an_input_for_them() {
-    let chain = |setting| Chain::around(Box::new(Counter(0.0)), &dimensionless(&[setting]));
+    let chain = |setting| Chain::around(Box::new(Counter(0.0)), &dimensionless(setting));
     let mut late = chain("chain.delay=2");
     for value in [0.0, 0.0, 1.0, 2.0, 3.0] {
         let Sensors { response, reference } = late.sense().unwrap();
@@ -344,7 +324,7 @@ fn a_delay_keeps_the_order_of_both_sensors_and_held_samples_need_an_input_for_th
 
 #[test]
 fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04() {
-    let scene = dimensionless(&[]);
+    let scene = dimensionless("");
     let clean = record(&mut Simulated::new(scene.plant, scene.start).unwrap(), &scene).unwrap();
     let truth = crossings(&clean, &scene);
     let rms = |record: &Record| {
@@ -360,7 +340,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     // The zero crossings that the fit is compared with do not depend on the sample time: here of every fourth sample.
     let last = decay_points(&clean, &scene.knowledge(), DECAY_WINDOW).points;
     let last = last.iter().rfind(|point| point.c > COMPARED_ABOVE).unwrap().tau;
-    let scene = dimensionless(&["controller.samples_per_period=400"]);
+    let scene = dimensionless("controller.samples_per_period=400");
     let fine = record(&mut Simulated::new(scene.plant, scene.start).unwrap(), &scene).unwrap();
     let coarse = Record {
         sample_time: 4.0 * fine.sample_time,
@@ -505,15 +485,12 @@ fn a_response_that_creeps_below_the_fold_behind_noise_is_a_point_of_the_backbone
     ];
     for (numbers, seed) in [(fast, 1), (fast, 2), (fast, 3), (slow, 28)] {
         let names = ["plant.epsilon", "plant.lambda", "plant.r", "excitation.G", "chain.snr"];
-        let mut settings: Vec<String> = names
+        let numbers = names
             .iter()
             .zip(numbers)
-            .map(|(name, value)| format!("{name}={value}"))
-            .collect();
-        settings.extend(["start.dq2=0", "controller.omega_min=0.8", "controller.omega_max=1.2"].map(String::from));
-        settings.extend([format!("chain.seed={seed}"), "record.decay_periods=3".into()]);
-        let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-        let scene = dimensionless(&settings);
+            .map(|(name, value)| format!("{name}={value} "));
+        let rest = "start.dq2=0 controller.omega_min=0.8 controller.omega_max=1.2 record.decay_periods=3";
+        let scene = dimensionless(&format!("{}{rest} chain.seed={seed}", numbers.collect::<String>()));
         let at = lock(&scene).at;
         let distance = ExactCurve::of(&scene.dimensionless()).distance(at.c, at.sigma, at.g);
         let u = at.u_c.max(at.u_sigma).max(at.u_g);

@@ -30,7 +30,8 @@ fn of(folder: &TempDir, lines: &str) -> Result<Scene, SceneError> {
     Scene::load(Some(&file), &[])
 }
 
-const BEAM: &str = "\
+/// A beam by two modes.
+pub const BEAM: &str = "\
 [plant]
 m = 0.032
 b = 0.01
