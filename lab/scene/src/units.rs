@@ -47,7 +47,7 @@ pub struct Units {
 
 impl Units {
     /// Those of one oscillator.
-    pub const OSCILLATOR: Self = Self {
+    pub(crate) const OSCILLATOR: Self = Self {
         command: Unit::METRE,
         reference: Unit::METRE,
         response: Unit::METRE,

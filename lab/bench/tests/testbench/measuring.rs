@@ -11,16 +11,15 @@ use vines_bench::backbone::LevelPoint;
 use vines_bench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_bench::experiment::{ExperimentError, SearchFound};
 use vines_bench::identification::{
-    DECAY_WINDOW, IdentificationError, Lock, Regime, ResonancePoint, decay_points, foreign_tone, identify,
-    regime_by_response,
+    DECAY_WINDOW, IdentificationError, Lock, Regime, ResonancePoint, decay_points, identify,
 };
 use vines_bench::loop_check::check;
-use vines_bench::record::{Record, Sample};
+use vines_bench::record::Record;
 use vines_bench::rig::{
     BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated,
 };
 use vines_bench::scene::{Dimensionless, Scene};
-use vines_model::numerics::{Estimate, mean_square};
+use vines_model::numerics::mean_square;
 use vines_model::orbit::phase_resonant;
 
 use super::common::{self, crossings, noisy, rig_with_stable_orbit, uniform};
@@ -714,50 +713,6 @@ fn a_response_that_repeats_after_two_to_four_periods_is_not_called_1_1_also_thro
             assert!(is_named, "{periods}: {found:?}");
         }
     }
-}
-
-const QUANTITIES: [&str; 3] = ["displacement", "velocity", "acceleration"];
-
-#[test]
-fn no_motion_of_a_particle_is_a_foreign_tone() {
-    let mut irregular = 0;
-    // Values that fill their intervals evenly.
-    for n in 0..60 {
-        let share = |k: u32| (0.5 + f64::from(n) * 0.754_877_666_246_692_7_f64.powi(k as i32)).fract();
-        let between = |k: u32, low: f64, high: f64| low * (high / low).powf(share(k));
-        let settings = [
-            format!("plant.m={}", 3.807 * between(1, 0.001, 0.05)),
-            format!("plant.r={}", 0.3 + 0.65 * share(2)),
-            format!("excitation.G={}", between(3, 0.1, 4.0)),
-            format!("resonance.sensor={}", if n % 4 == 0 { "v" } else { "q1" }),
-            format!(
-                "resonance.sensor_quantity={}",
-                QUANTITIES[n as usize % 4 - usize::from(n % 4 > 0)]
-            ),
-        ];
-        let scene = paper(&settings.each_ref().map(String::as_str));
-        let omega = scene.dimensionless().omega(6.0 * share(4) - 3.0);
-        let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
-        let knowledge = checked(&scene).knowledge;
-        let step = scene.sample_time();
-        let mut rig = rig(&scene, &[]);
-        let samples: Vec<Sample> = (0..6000)
-            .map(|n| {
-                let (time, sensors) = (step * f64::from(n), knowledge.target.scaled(rig.sense().unwrap()));
-                rig.advance(drive, step).unwrap();
-                let command = Command { drive, ..Command::default() };
-                Sample { time, sensors, command, ..Sample::default() }
-            })
-            .collect();
-        // The first of these windows contains the transient.
-        for window in [&samples[1000..3000], &samples[4000..]] {
-            assert_eq!(foreign_tone(window, &knowledge, drive.omega), None, "{settings:?}");
-            let exact = |value| Estimate { value, uncertainty: 0.0 };
-            let regime = regime_by_response(window, &knowledge, exact(drive.amplitude), exact(drive.omega));
-            irregular += usize::from(regime == Regime::Other);
-        }
-    }
-    assert!(irregular >= 30);
 }
 
 // How fast the phase locks, and single precision.

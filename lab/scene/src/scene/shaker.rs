@@ -78,7 +78,7 @@ impl SceneShaker {
 
     /// The reference in the sections of the host: the displacement of the table, or the force of the stinger; and the inertia that is subtracted from
     /// it, per negative acceleration.
-    pub fn reference_and_inertia(&self, excitation: Excitation) -> [Row; 2] {
+    pub(super) fn reference_and_inertia(&self, excitation: Excitation) -> [Row; 2] {
         let end = &self.rows.end;
         let inertia = end.iter().map(|pair| pair.map(|value| self.compensated_mass * value));
         match excitation {
