@@ -298,28 +298,6 @@ fn a_compensated_force_drives_the_structure_alone() {
     }
 }
 
-#[test]
-fn readings_behind_a_compensated_force_cell_are_those_of_the_structure_alone() {
-    let scene = preset(0, COMPENSATED).unwrap();
-    let omega = scene.dimensionless().omega0;
-    let period = (TAU / omega / scene.sample_time()).round() as usize;
-    let mut rig = Simulated::without_chain(&scene.clone().at_rest()).unwrap();
-    let mut sums = [Complex::new(0.0, 0.0); 2];
-    // The motion settles to 1e-13 in 800 periods.
-    for n in 0..801 * period {
-        let drive = vines_bench::rig::Drive { omega, amplitude: 1.0, displacement: 0.0 };
-        rig.advance(drive, TAU / omega / period as f64).unwrap();
-        let Sensors { response, reference } = rig.sense().unwrap();
-        if n >= 800 * period {
-            let rotor = Complex::cis(-TAU * (n % period) as f64 / period as f64);
-            sums[0] += rotor * response;
-            sums[1] += rotor * reference.unwrap();
-        }
-    }
-    let error = (sums[0] / sums[1] / receptance(&scene, omega)[0] - 1.0).norm();
-    assert!(error < 1e-11, "{error:e}");
-}
-
 /// A plant that starts on an exact orbit under its voltage stays there.
 #[test]
 fn exact_orbits_with_a_shaker_are_motions_of_the_plant() {
