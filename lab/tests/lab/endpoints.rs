@@ -171,26 +171,6 @@ fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
 }
 
 #[test]
-fn from_a_rig_that_shows_its_sensors_only_and_is_at_rest_lock_and_backbone_are_the_exact_ones() {
-    let direct = identified("--rig built-in");
-    let rig = || Server::start("rig --lock-step --sensors-only");
-    let rigs = [rig(), rig(), rig()];
-    let peer = Server::start("controller");
-    // A controller at a network address learns that the rig is at rest.
-    for (rig, controller) in rigs.iter().zip(["built-in", &peer.1]) {
-        let far = identified(&format!("--rig {} --controller {controller}", rig.1));
-        assert!((sigma(&far) - sigma(&direct)).abs() < 2e-3);
-    }
-    let done = run(&format!("backbone --json --rig {} {FEW}", rigs[2].1));
-    assert_eq!(done.status.code(), Some(0));
-    let found = json(&done);
-    let error = |point: &Value| point["exact"]["sigma"].as_f64().unwrap().abs();
-    let errors: Vec<f64> = found["points"].as_array().unwrap().iter().map(error).collect();
-    let is_exact = errors.len() == 3 && errors.iter().all(|error| *error < 2e-3);
-    assert!(is_exact, "{errors:?}");
-}
-
-#[test]
 #[ignore = "mended with the estimator: G is 6e-4 low at a cut-off of 5 (on the default scene 8.0e-4, and 2.0e-3 at 4)"]
 fn the_gain_of_an_anti_alias_filter_is_corrected_across_the_network_as_built_in() {
     // The drive is G = 1.1. Clients whose scene does not have the filter, and clients whose scene has it.
