@@ -17,11 +17,12 @@ use vines_bench::rig::{
     BuiltIn, Command, Measured, Rig, RigError, RigFault, RigStage, SensorFault, Sensors, SensorsOnly, Simulated,
     SimulatedStructure, faulty,
 };
-use vines_bench::scene::{Scene, SceneError, Structure, StructureMode};
+use vines_bench::scene::{Scene, SceneError, Structure};
 use vines_bench::survey::{BehindShaker, Survey, contradiction, phase_resonant};
 use vines_model::orbit::StructureOrbit;
 
 use super::common::{IntoParallelRefIterator, ParallelIterator, at, demodulated, mean_square};
+use super::structures::Modal;
 use super::{Altered, Asked, Foreign, changed, identified, paper, record, record_of, says, tracked_of};
 
 const PRESETS: [&str; 3] = [
@@ -197,6 +198,17 @@ fn edged(rest: &str) -> Scene {
     Scene::parse("edged", &format!("{text}{rest}"), &[]).unwrap()
 }
 
+/// The plant of a scene on an exact orbit, and the drive that holds it there.
+fn on_orbit(scene: &Scene, orbit: &StructureOrbit) -> (Plant<lovines::Structure>, Drive) {
+    let host = scene.structure.as_ref().unwrap().host.clone();
+    let mut plant = Plant::with_host(host, scene.plant, &StructureState::default()).unwrap();
+    let drive = Drive::harmonic(orbit.drive, orbit.omega);
+    plant.begin(drive).unwrap();
+    let start = &orbit.start;
+    plant.set_sections(&start.sections, [start.q2, start.dq2]).unwrap();
+    (plant, drive)
+}
+
 #[test]
 fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
     let scene = edged("");
@@ -209,11 +221,7 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
         .into_iter()
         .find(|orbit| orbit.stable)
         .unwrap();
-    let mut plant = Plant::with_host(structure.host.clone(), scene.plant, &StructureState::default()).unwrap();
-    let drive = Drive::harmonic(orbit.drive, orbit.omega);
-    plant.begin(drive).unwrap();
-    let start = &orbit.start;
-    plant.set_sections(&start.sections, [start.q2, start.dq2]).unwrap();
+    let (mut plant, drive) = on_orbit(&scene, &orbit);
     let count = 20_000;
     let mut force = Vec::new();
     for _ in 0..count {
@@ -268,13 +276,7 @@ fn receptance(scene: &Scene, omega: f64) -> [Complex<f64>; 2] {
     let bare = preset(0, "cell_mass = 0.02 -> ").unwrap();
     let structure = bare.structure.as_ref().unwrap();
     assert_eq!(structure.points, scene.structure.as_ref().unwrap().points);
-    [structure.drive.unwrap(), structure.cavity].map(|from| {
-        let of = |mode: &StructureMode| {
-            let stiffness = Complex::new(mode.omega.powi(2) - omega * omega, 2.0 * mode.zeta * mode.omega * omega);
-            mode.shape[structure.sensor] * mode.shape[from] / stiffness
-        };
-        structure.modes.iter().map(of).sum()
-    })
+    [structure.drive.unwrap(), structure.cavity].map(|from| Modal(structure, omega).receptance(structure.sensor, from))
 }
 
 #[test]
@@ -303,18 +305,12 @@ fn a_compensated_force_drives_the_structure_alone() {
 fn exact_orbits_with_a_shaker_are_motions_of_the_plant() {
     for n in 0..PRESETS.len() {
         let scene = preset(n, "").unwrap();
-        let structure = scene.structure.as_ref().unwrap();
         let orbits = scene.structure_orbits().unwrap();
         let range = [0.97, 1.0].map(|share| share * scene.dimensionless().omega0);
         let found = orbits.resonant(scene.structure_drive().unwrap(), range);
         assert!(!found.is_empty(), "preset {n}");
         for orbit in found {
-            let mut plant = Plant::with_host(structure.host.clone(), scene.plant, &StructureState::default()).unwrap();
-            let drive = Drive::harmonic(orbit.drive, orbit.omega);
-            plant.begin(drive).unwrap();
-            plant
-                .set_sections(&orbit.start.sections, [orbit.start.q2, orbit.start.dq2])
-                .unwrap();
+            let (mut plant, drive) = on_orbit(&scene, &orbit);
             let before = plant.state();
             plant.advance(drive, 2.0 * PI / orbit.omega).unwrap();
             let (after, b) = (plant.state(), scene.plant.half_width);

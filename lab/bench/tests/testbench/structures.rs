@@ -546,7 +546,7 @@ fn the_uncertainty_of_a_lock_covers_what_a_response_that_still_creeps_is_off() {
 }
 
 /// Receptances and base responses of modes at points, by the sum over the modes.
-struct Modal<'a>(&'a Structure, f64);
+pub struct Modal<'a>(pub &'a Structure, pub f64);
 
 impl Modal<'_> {
     fn sum(&self, of: impl Fn(usize) -> Complex<f64>) -> Complex<f64> {
@@ -558,7 +558,7 @@ impl Modal<'_> {
         modes.sum()
     }
 
-    fn receptance(&self, to: usize, from: usize) -> Complex<f64> {
+    pub fn receptance(&self, to: usize, from: usize) -> Complex<f64> {
         self.sum(|n| Complex::from(self.0.modes[n].shape[to] * self.0.modes[n].shape[from]))
     }
 
