@@ -10,7 +10,7 @@ const MAGIC: [u8; 2] = *b"HL";
 /// Version of the protocol.
 pub const VERSION: u8 = 3;
 /// Longest payload of a frame, bytes.
-pub(crate) const MAX_PAYLOAD: usize = 1024;
+pub const MAX_PAYLOAD: usize = 1024;
 /// Largest number of values in a packet of a stream: it has 1472 bytes, 20 of them before the values.
 pub(crate) const MAX_VALUES: usize = (1472 - 20) / 4;
 /// Number of harmonics of a Fourier series, whose coefficients are mean, cosines, sines.
