@@ -5,14 +5,12 @@ use std::cell::Cell;
 use std::f64::consts::PI;
 
 use phase_lock::Config;
-use vines_bench::experiment::{self, ExperimentError};
 use vines_bench::identification::{DecayEnd, Identification, IdentificationError, identify};
 use vines_bench::loop_check::check;
-use vines_bench::record::Record;
 use vines_bench::rig::{Command, Drive, Rig, Sensors, Simulated};
 use vines_bench::scene::Scene;
 
-use super::{Altered, Asked, Foreign, paper};
+use super::{Altered, foreign, paper};
 
 /// Settings of a run whose decay is short.
 const SHORT: &str = "record.decay_periods=30";
@@ -21,40 +19,16 @@ fn scene(settings: &[&str]) -> Scene {
     paper(&[&[SHORT][..], settings].concat())
 }
 
-/// An experiment with a controller of this configuration and answer, and the last drive that reached the rig, amplitude and displacement, m.
-fn run(
-    scene: &Scene,
-    configure: impl FnOnce(Config) -> Config,
-    mut change: impl FnMut(&mut Command, Asked),
-) -> (Result<Record, ExperimentError>, [f64; 2]) {
-    let mut last = [f64::NAN; 2];
-    let mut rig = Altered::driven(scene, |drive, step| {
-        last = [drive.amplitude, drive.displacement];
-        (drive, step)
-    });
-    let mut controller = Foreign::new(&configure(scene.controller_config()), |command: &mut Command, asked| {
-        change(command, asked);
-        Ok(())
-    });
-    let record = experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
-    drop(rig);
-    (record, last)
-}
-
 #[test]
 fn a_controller_that_does_not_release_the_drive_is_an_error_and_the_bench_switches_it_off() {
     let scene = scene(&[]);
     let amplitude = scene.amplitude;
     let refused = |change: &dyn Fn(&mut Command, usize), words: &str| {
-        let (record, last) = run(
-            &scene,
-            |config| config,
-            |command, (active, asked)| {
-                if !active {
-                    change(command, asked);
-                }
-            },
-        );
+        let (record, last, _) = foreign(&scene, &scene.controller_config(), |command, (active, asked)| {
+            if !active {
+                change(command, asked);
+            }
+        });
         let message = record.unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
         assert_eq!(last, [0.0; 2], "{message}");
@@ -85,15 +59,11 @@ fn a_controller_that_does_not_release_the_drive_is_an_error_and_the_bench_switch
 fn a_decay_begins_at_the_end_of_the_ramp() {
     let scene = scene(&["record.decay_periods=60"]);
     let ramp = scene.plan().knowledge.samples(4.0);
-    let (record, _) = run(
-        &scene,
-        |config| config,
-        |command, (active, asked)| {
-            if !active {
-                command.drive.amplitude = scene.amplitude * (1.0 - (asked + 1) as f64 / ramp as f64).max(0.0);
-            }
-        },
-    );
+    let (record, ..) = foreign(&scene, &scene.controller_config(), |command, (active, asked)| {
+        if !active {
+            command.drive.amplitude = scene.amplitude * (1.0 - (asked + 1) as f64 / ramp as f64).max(0.0);
+        }
+    });
     let record = record.unwrap();
     assert_eq!(record.released - record.hold_end, ramp - 1);
     assert!(
@@ -188,14 +158,15 @@ fn a_lock_is_at_the_requested_drive_and_its_decay_begins_where_the_base_rests_al
 fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
     let scene = scene(&["phase_lock.acquire_timeout=60"]);
     let said = |turned: f64, times: f64, settled: Option<bool>| {
-        let configure = |config: Config| Config {
+        let config = scene.controller_config();
+        let config = Config {
             phase_target: config.phase_target + turned * PI / 180.0,
             amplitude: times * config.amplitude,
             response_max: None,
             residual_max: None,
             ..config
         };
-        let (record, last) = run(&scene, configure, |command, _| command.settled = settled);
+        let (record, last, _) = foreign(&scene, &config, |command, _| command.settled = settled);
         let message = match record {
             Err(error) => error.to_string(),
             Ok(record) => match identify(&record, &scene.plan()) {

@@ -13,7 +13,7 @@ use vines_bench::record::Record;
 use vines_bench::rig::{Command, ControllerError, Drive, RigError, RigFault, SensorFault, Simulated, faulty};
 use vines_bench::scene::Scene;
 
-use super::{Altered, Asked, Foreign, checked, paper as scene, record, record_of, tracked, tracked_of};
+use super::{Altered, Asked, Foreign, checked, foreign, paper as scene, record, record_of, tracked, tracked_of};
 
 /// Time from a fault to a drive of zero, s, and whether the run ended early.
 fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Option<f64>, bool) {
@@ -163,24 +163,14 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
 }
 
 /// An experiment with a controller without limits and with another answer, and the largest drive that reached the rig, m.
-fn foreign(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, ExperimentError>, f64) {
-    let mut largest = 0.0_f64;
-    let mut rig = Altered::driven(scene, |drive, step| {
-        largest = drive.amplitude.max(largest);
-        (drive, step)
-    });
+fn unlimited(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, ExperimentError>, f64) {
     let limits = Config {
         amplitude_max: None,
         response_max: None,
         residual_max: None,
         ..scene.controller_config()
     };
-    let mut controller = Foreign::new(&limits, |command: &mut Command, (_, sample): Asked| {
-        change(command, sample);
-        Ok(())
-    });
-    let record = experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
-    drop(rig);
+    let (record, _, largest) = foreign(scene, &limits, |command, (_, sample)| change(command, sample));
     (record, largest)
 }
 
@@ -189,7 +179,7 @@ fn the_limits_of_the_scene_guard_the_rig_whatever_controls_it() {
     let scene = scene(&[]);
     let limit = scene.controller_config().amplitude_max.unwrap();
     let refused = |scene: &Scene, change, words: &str| {
-        let (record, largest) = foreign(scene, change);
+        let (record, largest) = unlimited(scene, change);
         let message = record.unwrap_err().to_string();
         assert!(message.contains(words) && largest <= limit, "{message} {largest}");
     };
@@ -211,7 +201,7 @@ fn the_limits_of_the_scene_guard_the_rig_whatever_controls_it() {
 
 #[test]
 fn the_bench_judges_a_lock_through_noise_by_what_the_response_shows_of_it() {
-    let settled = |settings: &[&str], change| foreign(&scene(settings), change).0.map(|record| record.settled);
+    let settled = |settings: &[&str], change| unlimited(&scene(settings), change).0.map(|record| record.settled);
     let silent = settled(&[], |_, _| ()).unwrap();
     for snr in ["chain.snr=80", "chain.snr=60", "chain.snr=40"] {
         let noisy = settled(&[snr], |_, _| ()).unwrap();

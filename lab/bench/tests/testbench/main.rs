@@ -126,6 +126,28 @@ impl<F: FnMut(&mut Command, Asked) -> Result<(), ControllerError>> Controller fo
     }
 }
 
+/// An experiment with a controller of this configuration with another answer; amplitude and displacement of the last drive that reached the rig, m, and
+/// the largest amplitude.
+fn foreign(
+    scene: &Scene,
+    config: &Config,
+    mut change: impl FnMut(&mut Command, Asked),
+) -> (Result<Record, ExperimentError>, [f64; 2], f64) {
+    let (mut last, mut largest) = ([f64::NAN; 2], 0.0_f64);
+    let mut rig = Altered::driven(scene, |drive, step| {
+        last = [drive.amplitude, drive.displacement];
+        largest = largest.max(drive.amplitude);
+        (drive, step)
+    });
+    let mut controller = Foreign::new(config, |command: &mut Command, asked| {
+        change(command, asked);
+        Ok(())
+    });
+    let record = run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+    drop(rig);
+    (record, last, largest)
+}
+
 /// The record of an experiment.
 fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
