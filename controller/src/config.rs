@@ -609,13 +609,24 @@ mod tests {
     }
 
     #[test]
-    fn a_value_of_another_type_is_refused_by_name_and_unit() {
+    fn a_value_of_another_type_or_out_of_range_is_refused_by_name_and_unit() {
         let mut config = Config::for_resonance(55.0, 1e-4);
-        let refused = Parameter::find("delay")
-            .expect("a parameter")
-            .set(&mut config, Value::Integer(-3))
-            .expect_err("an integer is refused");
-        assert_eq!((refused.name, refused.value, refused.unit), ("delay", Some(-3.0), "s"));
+        for (name, value, unit) in [
+            ("delay", -3, "s"),
+            ("harmonics", 9, ""),
+            ("harmonics", -1, ""),
+            ("lock.dwell", 0, "periods"),
+            ("detector", 3, ""),
+        ] {
+            let refused = Parameter::find(name)
+                .expect("a parameter")
+                .set(&mut config, Value::Integer(value));
+            let refused = refused.expect_err(name);
+            assert_eq!(
+                (refused.name, refused.value, refused.unit),
+                (name, Some(f64::from(value)), unit)
+            );
+        }
     }
 
     #[test]
@@ -628,16 +639,5 @@ mod tests {
         assert_eq!(config.bandwidth_max(), 1.0 / (7.0 * 1e-4));
         let demodulator = Config { detector: Detector::Demodulator, ..config };
         assert_eq!(demodulator.bandwidth_max(), 1.0 / 1e-4);
-    }
-
-    #[test]
-    fn a_whole_number_out_of_range_is_refused_at_once() {
-        let mut config = Config::for_resonance(55.0, 1e-4);
-        for (name, value) in [("harmonics", 9), ("harmonics", -1), ("lock.dwell", 0), ("detector", 3)] {
-            let refused = Parameter::find(name)
-                .expect("a parameter")
-                .set(&mut config, Value::Integer(value));
-            assert_eq!(refused.expect_err(name).value, Some(f64::from(value)));
-        }
     }
 }

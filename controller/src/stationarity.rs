@@ -246,35 +246,6 @@ mod tests {
         })
     }
 
-    #[test]
-    fn a_constant_signal_settles_after_the_dwell() {
-        assert_eq!(periods_to_settle(|_| CONSTANT), Some(20));
-    }
-
-    #[test]
-    fn ripple_within_the_period_does_not_matter() {
-        let reading = |t: f64| LockSample {
-            error: 0.05 * libm::sin(core::f64::consts::TAU * t),
-            ..CONSTANT
-        };
-        assert_eq!(periods_to_settle(reading), Some(20));
-    }
-
-    #[test]
-    fn a_signal_that_drifts_too_fast_does_not_settle() {
-        let amplitude = |rate: f64| move |t: f64| LockSample { amplitude: 1.0 + rate * t, ..CONSTANT };
-        assert_eq!(periods_to_settle(amplitude(1.1e-4)), None);
-        assert_eq!(periods_to_settle(amplitude(0.9e-4)), Some(20));
-        let frequency = |t: f64| LockSample { integral: 1.0 + 1.1e-6 * t, ..CONSTANT };
-        assert_eq!(periods_to_settle(frequency), None);
-    }
-
-    #[test]
-    fn a_slow_modulation_is_not_stationary_at_its_crest() {
-        let reading = |t: f64| LockSample { amplitude: 1.0 + 0.1 * libm::sin(0.06 * t), ..CONSTANT };
-        assert_eq!(periods_to_settle(reading), None);
-    }
-
     /// A reproducible number between -1 and 1.
     fn noise(n: f64) -> f64 {
         let x = libm::sin(n * 12.9898) * 43_758.547;
@@ -291,53 +262,59 @@ mod tests {
     }
 
     #[test]
-    fn noise_that_hides_the_tolerances_settles_after_two_dwells() {
-        assert_eq!(periods_to_settle(noisy(0.0, 0.01)), Some(40));
-    }
-
-    #[test]
-    fn a_scatter_without_noise_of_the_readings_does_not_settle() {
-        let reading = |t: f64| LockSample { residual_power: 0.0, ..noisy(0.0, 0.01)(t) };
-        assert_eq!(periods_to_settle(reading), None);
-    }
-
-    #[test]
-    fn a_modulation_is_no_noise_although_it_has_a_residual() {
+    fn a_signal_settles_after_the_dwell_unless_it_drifts_or_is_modulated_and_after_two_where_noise_hides_the_tolerances()
+     {
+        use core::f64::consts::TAU;
+        let amplitude = |amplitude: f64| LockSample { amplitude, ..CONSTANT };
+        let sine = |period: f64, t: f64| libm::sin(TAU * t / period);
+        let settles = |reading: &dyn Fn(f64) -> LockSample, expected: Option<u32>, what: &str| {
+            assert_eq!(periods_to_settle(reading), expected, "{what}");
+        };
+        settles(&|_| CONSTANT, Some(20), "constant");
+        settles(
+            &|t| LockSample { error: 0.05 * sine(1.0, t), ..CONSTANT },
+            Some(20),
+            "ripple within the period",
+        );
+        settles(&|t| amplitude(1.0 + 0.9e-4 * t), Some(20), "slow drift");
+        settles(&|t| amplitude(1.0 + 1.1e-4 * t), None, "drift of the amplitude");
+        settles(
+            &|t| LockSample { integral: 1.0 + 1.1e-6 * t, ..CONSTANT },
+            None,
+            "drift of the frequency",
+        );
+        settles(
+            &|t| amplitude(1.0 + 0.1 * libm::sin(0.06 * t)),
+            None,
+            "crest of a slow modulation",
+        );
+        settles(
+            &|t| LockSample { valid: t != 10.5, ..CONSTANT },
+            Some(30),
+            "one invalid sample",
+        );
+        settles(&noisy(0.0, 0.01), Some(40), "noise");
+        settles(
+            &|t| LockSample { residual_power: 0.0, ..noisy(0.0, 0.01)(t) },
+            None,
+            "scatter without noise of the readings",
+        );
+        settles(&noisy(1.5e-3, 0.01), None, "drift that exceeds the noise");
+        settles(&noisy(5e-3, 0.01), None, "drift that exceeds the noise by far");
+        // A range of 0.04, where noise alone may have 0.045; means of quarters differ by 0.025 or more, by noise at most by 0.02.
+        let modulated = |t: f64| LockSample { amplitude: 1.0 + 0.02 * sine(40.0, t), ..noisy(0.0, 0.01)(t) };
+        settles(&modulated, None, "modulation within the noise of the readings");
         for period in [4.0, 10.0, 30.0, 60.0] {
-            let rate = core::f64::consts::TAU / period;
-            let residual = rate / libm::hypot(rate, 0.1 * core::f64::consts::TAU);
+            let rate = TAU / period;
+            let residual = rate / libm::hypot(rate, 0.1 * TAU);
             let estimate = libm::sqrt(1.0 - residual * residual);
             let reading = |t: f64| LockSample {
-                amplitude: 1.0 + 0.02 * estimate * libm::sin(rate * t),
+                amplitude: 1.0 + 0.02 * estimate * sine(period, t),
                 residual_power: 0.5 * (0.02 * residual) * (0.02 * residual),
                 ..CONSTANT
             };
-            assert_eq!(periods_to_settle(reading), None, "{period}");
+            settles(&reading, None, "a modulation is no noise although it has a residual");
         }
-    }
-
-    #[test]
-    fn a_drift_that_exceeds_the_noise_does_not_settle() {
-        for drift in [1.5e-3, 5e-3] {
-            assert_eq!(periods_to_settle(noisy(drift, 0.01)), None, "{drift}");
-        }
-    }
-
-    #[test]
-    fn a_modulation_within_the_noise_of_the_readings_shows_in_the_means_of_quarters() {
-        // A range of 0.04, where noise alone may have 0.045; means of quarters differ by 0.025 or more, by noise at most by 0.02.
-        let rate = core::f64::consts::TAU / 40.0;
-        let reading = |t: f64| LockSample {
-            amplitude: 1.0 + 0.02 * libm::sin(rate * t),
-            ..noisy(0.0, 0.01)(t)
-        };
-        assert_eq!(periods_to_settle(reading), None);
-    }
-
-    #[test]
-    fn one_invalid_sample_restarts_the_dwell() {
-        let reading = |t: f64| LockSample { valid: t != 10.5, ..CONSTANT };
-        assert_eq!(periods_to_settle(reading), Some(30));
     }
 
     #[test]

@@ -209,32 +209,19 @@ mod tests {
     }
 
     #[test]
-    fn no_state_drives_after_active_becomes_false() {
+    fn no_state_drives_when_inactive_or_on_a_fault_and_a_latched_one_ends_only_when_inactive() {
+        let inactive = Conditions { active: false, ..ACTIVE };
+        let faulty = Conditions { fault: Some(Fault::Sensor), ..ACTIVE };
         for state in LoopState::ALL {
-            assert!(!drives(state.next(&Conditions { active: false, ..ACTIVE }).0));
-        }
-    }
-
-    #[test]
-    fn no_state_drives_on_a_fault() {
-        let conditions = Conditions { fault: Some(Fault::Sensor), ..ACTIVE };
-        for state in LoopState::ALL {
-            assert!(!drives(state.next(&conditions).0));
-        }
-    }
-
-    #[test]
-    fn a_latched_state_ends_only_when_active_becomes_false() {
-        let latched = [LoopState::LockLost, LoopState::Tripped];
-        assert!(
-            LoopState::ALL
-                .into_iter()
-                .filter(|state| state.is_latched())
-                .eq(latched)
-        );
-        for state in latched {
-            assert_eq!(state.next(&ACTIVE).0, state);
-            assert_eq!(state.next(&Conditions { active: false, ..ACTIVE }).0, LoopState::Idle);
+            assert!(!drives(state.next(&inactive).0) && !drives(state.next(&faulty).0));
+            let is_latched = [LoopState::LockLost, LoopState::Tripped].contains(&state);
+            assert_eq!(state.is_latched(), is_latched);
+            if is_latched {
+                assert_eq!(
+                    (state.next(&ACTIVE).0, state.next(&inactive).0),
+                    (state, LoopState::Idle)
+                );
+            }
         }
     }
 

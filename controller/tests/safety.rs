@@ -45,12 +45,18 @@ fn before_the_first_sample_there_is_the_start_frequency_and_no_drive() {
 
 #[test]
 fn an_invalid_reading_ramps_the_drive_down_and_latches() {
+    // Also while the response is controlled.
+    let benches = [Bench::locked, holding].map(|bench| bench(Config { ramp_rate: Some(AMPLITUDE), ..config() }));
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
-        for (response, reference) in [(bad, 0.0), (0.0, bad)] {
-            let mut bench = Bench::locked(Config { ramp_rate: Some(AMPLITUDE), ..config() });
+        for (bench, [response, reference]) in benches
+            .iter()
+            .flat_map(|bench| [(bench, [bad, 0.0]), (bench, [0.0, bad])])
+        {
+            let mut bench = *bench;
             let before = bench.sample().amplitude;
             let output = bench.sample_reading(response, Some(reference));
             assert_eq!((output.state, output.fault), (LoopState::Tripped, Some(Fault::Sensor)));
+            assert_eq!(output.response_target, None);
             assert!(output.amplitude < before && output.amplitude > 0.9 * before, "gradual");
             let output = bench.run(100);
             assert_eq!((output.state, output.amplitude), (LoopState::Tripped, 0.0));
@@ -124,17 +130,6 @@ fn holding(config: Config) -> Bench {
     });
     bench.run(200);
     bench
-}
-
-#[test]
-fn a_sensor_that_fails_while_the_response_is_controlled_ramps_the_drive_down() {
-    let mut bench = holding(Config { ramp_rate: Some(AMPLITUDE), ..config() });
-    let before = bench.sample();
-    assert!(before.locked && before.response_target.is_some());
-    let output = bench.sample_reading(f64::NAN, None);
-    assert_eq!((output.fault, output.response_target), (Some(Fault::Sensor), None));
-    assert!(output.amplitude < before.amplitude && output.amplitude > 0.9 * before.amplitude);
-    assert_eq!(bench.run(50).amplitude, 0.0);
 }
 
 #[test]

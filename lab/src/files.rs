@@ -11,7 +11,6 @@ use vines_fmu::process::Cleanup;
 /// Why a file could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
-#[expect(missing_docs, reason = "the message explains the fields")]
 pub struct FileError {
     pub path: PathBuf,
     pub source: io::Error,

@@ -10,10 +10,10 @@ mod files;
 pub mod fmu_rig;
 pub mod pack;
 pub mod regime_map;
-pub mod report;
-pub mod table;
+pub(crate) mod report;
+pub(crate) mod table;
 
-pub use files::{FileError, ResultFolder, create_folder_of, writable, write_file};
+pub(crate) use files::{FileError, ResultFolder, create_folder_of, writable, write_file};
 pub use vines_bench::{
     advice, backbone, cells, comparison, experiment, fit, identification, knowledge, linear, live, loop_check, plan,
     record, rig, scene, survey,

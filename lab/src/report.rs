@@ -5,6 +5,5 @@ mod figures;
 mod files;
 mod theme;
 
-pub use figure::Figure;
 pub use figures::{fitted, responses, structure, theory};
-pub use files::{ReportError, ResultFile, identification_files, map_files, tracked_files};
+pub use files::{ReportError, identification_files, map_files, tracked_files};

@@ -496,23 +496,6 @@ def test_ctrl_c_ends_every_long_calculation_whatever_it_does():
     assert plant["time"] == 0.0
 
 
-def test_other_threads_run_while_plants_advance():
-    counted, stop = [0], threading.Event()
-
-    def count():
-        while not stop.wait(0.005):
-            counted[0] += 1
-
-    thread = threading.Thread(target=count)
-    thread.start()
-    before = counted[0]
-    vines.Batch(vines.Scene(), {"dq2": np.linspace(0.3, 0.6, 2000)}).advance(30.0, **DRIVE, events=False)
-    during = counted[0] - before
-    stop.set()
-    thread.join()
-    assert during > 5
-
-
 CAVITY = {
     "b_plus": 0.011, "b_minus": 0.009, "theta": 0.1, "mu_k": 0.2, "mu_s": 0.3, "r_plus": 0.7, "r_minus": 0.6,
     "r_min": 0.1, "r_scatter": 0.1, "seed": 3,

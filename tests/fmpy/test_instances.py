@@ -37,17 +37,6 @@ def test_one_step_of_fifty_periods_equals_many_small_ones_in_an_experiment_that_
     figure("one step of 50 periods against 4321 steps: worst state", difference, below=1e-11)
 
 
-def test_the_controller_counts_its_own_samples(instance):
-    drives = []
-    for length, count in ((0.01, 10), (0.005, 20), (0.05, 2), (0.1, 1)):
-        controller = instance("PhaseLock").start({"sample_time": 0.001, "bandwidth": 5.0})
-        controller.set({"active": True})
-        controller.step(length, count)
-        drives.append(controller.get("drive"))
-    assert drives[0] != 0
-    assert drives == drives[:1] * len(drives)
-
-
 def test_fmpy_simulates_the_plant(fmus, instance, figure):
     path = str(fmus["LoViNes"].path)
     found = simulate_fmu(path, stop_time=100, output_interval=0.5, start_values=DRIVEN, output=[*STATES, "impacts"])
@@ -107,20 +96,6 @@ def test_a_signal_given_as_polynomials_approaches_the_oscillator(instance, figur
     figure("e as cubics, 100 samples a period: error of q1 over E", coarse, below=1e-4)
     # The error of a cubic goes with the fourth power of the step.
     figure("e as cubics: error at half the step over error", fine / coarse, between=(0, 1 / 8))
-
-
-@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
-def test_values_that_make_no_sense_are_refused_by_name_whatever_the_logging_and_a_reset_helps(instance, name):
-    bad, words = {
-        "LoViNes": ({"M": -1}, "M (primary mass) = -1 kg is refused"),
-        "PhaseLock": ({"sample_time": 0}, "sample_time = 0 s is refused"),
-    }[name]
-    component = instance(name)
-    with pytest.raises(FMICallException):
-        component.start(bad)
-    assert any(words in message.text and message.category == "logStatusError" for message in component.messages)
-    component.slave.reset()
-    component.start().step(0.01)
 
 
 def test_an_amplitude_above_its_limit_is_refused_before_and_after_the_first_step(instance):

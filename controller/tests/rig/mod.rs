@@ -58,6 +58,7 @@ pub fn config() -> Config {
 }
 
 /// A controller and its state, coupled to a resonator.
+#[derive(Clone, Copy)]
 pub struct Bench {
     pub controller: PhaseLock,
     pub state: State,

@@ -17,14 +17,16 @@ use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
 use vines_scene::scene::Measurand;
 
-pub use asked::Departure;
-pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, Harmonic, decay_points, harmonic};
-pub(crate) use decay::{PER_PERIOD, base_at_rest};
-pub use level::{Criterion, LevelEstimate, Unsteady};
+pub(crate) use asked::Departure;
+pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
+pub(crate) use decay::{Harmonic, PER_PERIOD, base_at_rest, harmonic};
+pub(crate) use level::{Criterion, LevelEstimate, Unsteady};
 pub(crate) use level::{LONGEST_SETTLING, is_off_target};
-pub use resonance_fit::{Cycle, ResonanceFit};
-pub(crate) use response::{ASYMMETRIC, Line, classify, degrees, subharmonic, without_tones};
-pub use response::{Tone, drive_harmonics, foreign_tone, impacts, regime_by_response};
+pub(crate) use resonance_fit::{Cycle, ResonanceFit};
+pub use response::Tone;
+pub(crate) use response::{
+    ASYMMETRIC, Line, classify, degrees, drive_harmonics, foreign_tone, regime_by_response, subharmonic, without_tones,
+};
 pub use vines_model::regime::{Impact, Regime};
 
 /// Why a record cannot be identified.

@@ -13,8 +13,10 @@ pub use chain::Chain;
 pub use faulty::{RigFault, SensorFault, faulty};
 pub use oscillator::Simulated;
 pub(crate) use reference_control::OFF;
-pub use stages::{Interrupted, Measured, Scaled, SensorsOnly, Stoppable};
-pub use structure::{ShakerFault, SimulatedStructure};
+pub(crate) use stages::Scaled;
+pub use stages::{Interrupted, Measured, SensorsOnly, Stoppable};
+pub(crate) use structure::ShakerFault;
+pub use structure::SimulatedStructure;
 pub use vines_rig::{
     Clock, Command, Controller, ControllerError, Drive, Fault, ForceCell, FrictionTotals, GroundTruth, LoopState, Move,
     Rig, RigError, RigStage, Sensors,

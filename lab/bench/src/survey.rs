@@ -170,7 +170,7 @@ pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
 
 /// The exact orbits of a scene at phase resonance, one by one, in the numbers of its oscillator or driven mode.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ExactOrbits {
+pub(crate) struct ExactOrbits {
     numbers: Dimensionless,
     /// Of a structure: its orbits, and the units of its channels.
     structure: Option<(StructureOrbits, Units)>,
@@ -178,19 +178,19 @@ pub struct ExactOrbits {
 
 impl ExactOrbits {
     /// Those of the oscillator or the structure of a scene.
-    pub fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
+    pub(crate) fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
         let structure = scene.structure.as_ref().zip(scene.structure_orbits());
         let structure = structure.map(|(structure, orbits)| (orbits, structure.units()));
         Self { numbers: *numbers, structure }
     }
 
     /// Those of an oscillator.
-    pub fn of_oscillator(numbers: &Dimensionless) -> Self {
+    pub(crate) fn of_oscillator(numbers: &Dimensionless) -> Self {
         Self { numbers: *numbers, structure: None }
     }
 
     /// The orbit with the response C, near a detuning and a speed of the particle.
-    pub fn with_amplitude(&self, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
+    pub(crate) fn with_amplitude(&self, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
         let d = &self.numbers;
         let Some((orbits, units)) = &self.structure else {
             return orbit::with_amplitude(d, c, [sigma, speed]);

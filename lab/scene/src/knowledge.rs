@@ -236,7 +236,7 @@ impl Knowledge {
 
 /// Whether a motion of a plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of different restitution.
 /// Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
-pub fn has_mirror_images(plant: &Parameters) -> bool {
+fn has_mirror_images(plant: &Parameters) -> bool {
     let r = Restitution::Constant(plant.restitution);
     let [plus, minus] = plant.cavity.restitution.map(|law| law.unwrap_or(r));
     plant.cavity.tilt == 0.0 && plus == minus

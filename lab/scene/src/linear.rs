@@ -230,7 +230,7 @@ impl LinearResponse {
         2.0 * self.damping_rate.max(0.0) / self.omega0
     }
 
-    /// A point as it is stated: response, m, drive, m, and frequency, rad/s, whose uncertainties contain [`POINT_RESOLUTION`].
+    /// A point as it is stated: response, m, drive, m, and frequency, rad/s, whose uncertainties contain the resolution of a point.
     pub fn resolved(&self, [response, drive, omega]: [Estimate; 3]) -> [Estimate; 3] {
         let with =
             |Estimate { value, uncertainty }, unit: f64| Estimate::new(value, &[uncertainty, POINT_RESOLUTION * unit]);

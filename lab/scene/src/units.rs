@@ -11,7 +11,7 @@ pub struct Unit {
 
 impl Unit {
     /// The metre of the oscillator.
-    pub const METRE: Self = Self { symbol: "m", ratio: [1.0; 2] };
+    pub(crate) const METRE: Self = Self { symbol: "m", ratio: [1.0; 2] };
 
     /// The unit that is `metres` metres of the oscillator.
     pub fn of(symbol: &'static str, metres: f64) -> Self {
@@ -19,7 +19,7 @@ impl Unit {
     }
 
     /// The unit of which `units` are a metre of the oscillator.
-    pub fn per_metre(symbol: &'static str, units: f64) -> Self {
+    pub(crate) fn per_metre(symbol: &'static str, units: f64) -> Self {
         Self { symbol, ratio: [units, 1.0] }
     }
 
@@ -47,7 +47,7 @@ pub struct Units {
 
 impl Units {
     /// Those of one oscillator.
-    pub const OSCILLATOR: Self = Self {
+    pub(crate) const OSCILLATOR: Self = Self {
         command: Unit::METRE,
         reference: Unit::METRE,
         response: Unit::METRE,

@@ -18,7 +18,6 @@ use crate::scene::Scene;
 
 /// Why a report could not be computed, or the files of a run could not be written.
 #[derive(Debug, Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum ReportError {
     #[error(transparent)]
     Plant(#[from] InvalidValue),

@@ -1,9 +1,7 @@
 //! Guards the lab as its users meet it. Each file has the tests of one part; what several of them need is here.
 
-mod backbone;
 mod command_line;
 mod endpoints;
-mod experiment;
 mod map;
 mod packing;
 mod pair;
@@ -135,12 +133,6 @@ fn last_word(stream: &mut dyn Read) -> String {
     let mut line = String::new();
     BufReader::with_capacity(1, stream).read_line(&mut line).unwrap();
     line.trim().rsplit(' ').next().unwrap().to_string()
-}
-
-/// The dimensionless scene with other settings.
-fn scene(settings: &str) -> Scene {
-    let text = include_str!("../../../scenes/dimensionless.toml");
-    Scene::parse("dimensionless.toml", text, &overrides(settings)).unwrap()
 }
 
 fn overrides(settings: &str) -> Vec<Override> {

@@ -13,7 +13,7 @@ pub const SIZE: usize = 84;
 /// First four bytes of every frame in every version.
 pub const MAGIC: [u8; 4] = *b"VINE";
 /// Number of values in a frame.
-pub const VALUES: usize = 6;
+pub(crate) const VALUES: usize = 6;
 
 const CHECKSUM_AT: usize = SIZE - 4;
 
@@ -49,21 +49,21 @@ const KINDS: [Kind; 9] = {
 /// Booleans of a frame. A bit without a meaning in a kind is 0.
 pub mod flag {
     /// Sensors, to a controller: the drive is requested.
-    pub const ACTIVE: u8 = 1;
+    pub(crate) const ACTIVE: u8 = 1;
     /// Drive, from a controller: its lock has settled.
-    pub const SETTLED: u8 = 2;
+    pub(crate) const SETTLED: u8 = 2;
     /// Sensors: there is a reference channel.
-    pub const REFERENCE: u8 = 4;
+    pub(crate) const REFERENCE: u8 = 4;
     /// Sensors: the rig is a simulation, and its last four values describe the impacts.
-    pub const GROUND_TRUTH: u8 = 8;
+    pub(crate) const GROUND_TRUTH: u8 = 8;
     /// Sensors, from a rig in real time: the drive has been shut down for this session.
     pub const SHUT_DOWN: u8 = 16;
     /// Drive: the rig holds the displacement, instead of its oscillator with frequency and amplitude. Move: the control of the response ends.
-    pub const HOLD: u8 = 128;
+    pub(crate) const HOLD: u8 = 128;
     /// Drive, from a controller: its phase error cannot be measured.
-    pub const NO_PHASE: u8 = 32;
+    pub(crate) const NO_PHASE: u8 = 32;
     /// Hello and Welcome: the server is, or should be, a controller; otherwise a rig.
-    pub const CONTROLLER: u8 = 64;
+    pub(crate) const CONTROLLER: u8 = 64;
 }
 
 /// One frame.

@@ -518,6 +518,8 @@ impl Cycle {
 
 #[cfg(test)]
 mod tests {
+    use vines_scene::scene::Scene;
+
     use super::*;
     use crate::rig::{Command, Drive, Sensors};
 
@@ -530,7 +532,7 @@ mod tests {
             through_shaker: true,
             filter: None,
             delay: 0.0,
-            units: vines_scene::units::Units::OSCILLATOR,
+            units: Scene::load(None, &[]).unwrap().units(),
             held: false,
         };
         for in_period in [100.03, 100.1, 100.3, 100.51, 100.97] {

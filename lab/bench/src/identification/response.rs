@@ -167,7 +167,7 @@ impl Content {
 }
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
-pub fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
+pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
     let content = Content::of(samples, knowledge, omega, 0, ALL_HARMONICS)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
@@ -254,7 +254,7 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
 ///
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
-pub fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
+pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
     let Some(content) = Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) else {
         return Regime::Unknown;
     };
@@ -396,7 +396,7 @@ fn transform(values: &[f64], turn: f64) -> [f64; 2] {
 // The regime, from the impacts that a simulated rig reports.
 
 /// The impacts in the samples; of several between two samples, the last one.
-pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
+pub(super) fn impacts(samples: &[Sample]) -> Vec<Impact> {
     let truths: Vec<_> = samples.iter().filter_map(|sample| sample.ground_truth).collect();
     truths
         .windows(2)
@@ -424,4 +424,54 @@ pub(crate) fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64
         count * period / (samples.len() as f64 * sample_time)
     };
     (per_period, one_to_one(&impacts, per_period, MEASURED))
+}
+
+#[cfg(test)]
+mod tests {
+    use vines_scene::linear::LinearResponse;
+    use vines_scene::scene::Scene;
+
+    use super::*;
+    use crate::rig::{Command, Drive, Simulated};
+
+    #[test]
+    fn no_motion_of_a_particle_is_a_foreign_tone() {
+        let quantities = ["displacement", "displacement", "velocity", "acceleration"];
+        let mut irregular = 0;
+        // Values that fill their intervals evenly.
+        for n in 0..60 {
+            let share = |k: u32| (0.5 + f64::from(n) * 0.754_877_666_246_692_7_f64.powi(k as i32)).fract();
+            let between = |k: u32, low: f64, high: f64| low * (high / low).powf(share(k));
+            let settings = [
+                format!("plant.m={}", 3.807 * between(1, 0.001, 0.05)),
+                format!("plant.r={}", 0.3 + 0.65 * share(2)),
+                format!("excitation.G={}", between(3, 0.1, 4.0)),
+                format!("resonance.sensor={}", if n % 4 == 0 { "v" } else { "q1" }),
+                format!("resonance.sensor_quantity={}", quantities[n as usize % 4]),
+            ];
+            let overrides = settings.each_ref().map(|setting| setting.parse().unwrap());
+            let scene = Scene::load(None, &overrides).unwrap();
+            let omega = scene.dimensionless().omega(6.0 * share(4) - 3.0);
+            let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
+            let knowledge = scene.knowledge().measured(LinearResponse::of(&scene.plant));
+            let step = scene.sample_time();
+            let mut rig = Simulated::of(&scene).unwrap();
+            let samples: Vec<Sample> = (0..6000)
+                .map(|n| {
+                    let (time, sensors) = (step * f64::from(n), knowledge.target.scaled(rig.sense().unwrap()));
+                    rig.advance(drive, step).unwrap();
+                    let command = Command { drive, ..Command::default() };
+                    Sample { time, sensors, command, ..Sample::default() }
+                })
+                .collect();
+            // The first of these windows contains the transient.
+            for window in [&samples[1000..3000], &samples[4000..]] {
+                assert_eq!(foreign_tone(window, &knowledge, drive.omega), None, "{settings:?}");
+                let exact = |value| Estimate { value, uncertainty: 0.0 };
+                let regime = regime_by_response(window, &knowledge, exact(drive.amplitude), exact(drive.omega));
+                irregular += usize::from(regime == Regime::Other);
+            }
+        }
+        assert!(irregular >= 30);
+    }
 }

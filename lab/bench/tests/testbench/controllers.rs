@@ -2,38 +2,15 @@
 //! asked for.
 
 use std::cell::Cell;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use phase_lock::Config;
-use vines_bench::experiment::{self, ExperimentError};
 use vines_bench::identification::{DecayEnd, Identification, IdentificationError, identify};
 use vines_bench::loop_check::check;
-use vines_bench::record::Record;
-use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Sensors, Simulated};
+use vines_bench::rig::{Command, Drive, Rig, Sensors, Simulated};
 use vines_bench::scene::Scene;
 
-use super::{Altered, paper};
-
-/// The built-in controller with another answer, and without the control of the response. It does not say whether it has locked.
-struct Foreign<F> {
-    built_in: BuiltIn,
-    change: F,
-    asked: Asked,
-}
-
-/// What a controller is asked for: whether to drive, and for how many samples it has been asked this.
-type Asked = (bool, usize);
-
-impl<F: FnMut(&mut Command, Asked)> Controller for Foreign<F> {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        let (before, samples) = self.asked;
-        self.asked = (active, if before == active { samples + 1 } else { 0 });
-        let command = self.built_in.sample(sensors, active)?;
-        let mut command = Command { settled: None, state: None, ..command };
-        (self.change)(&mut command, self.asked);
-        Ok(command)
-    }
-}
+use super::{Altered, foreign, paper};
 
 /// Settings of a run whose decay is short.
 const SHORT: &str = "record.decay_periods=30";
@@ -42,43 +19,16 @@ fn scene(settings: &[&str]) -> Scene {
     paper(&[&[SHORT][..], settings].concat())
 }
 
-/// An experiment with a controller of this configuration and answer, and the last drive that reached the rig, amplitude and displacement, m.
-fn run(
-    scene: &Scene,
-    configure: impl FnOnce(Config) -> Config,
-    change: impl FnMut(&mut Command, Asked),
-) -> (Result<Record, ExperimentError>, [f64; 2]) {
-    let last = Cell::new([f64::NAN; 2]);
-    let drive = |drive: Drive, step| {
-        last.set([drive.amplitude, drive.displacement]);
-        (drive, step)
-    };
-    let mut rig = Altered {
-        rig: Simulated::of(scene).unwrap(),
-        read: Box::new(Ok),
-        drive: Box::new(drive),
-    };
-    let built_in = BuiltIn::new(&configure(scene.controller_config())).unwrap();
-    let mut controller = Foreign { built_in, change, asked: (true, 0) };
-    let record = experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
-    drop(rig);
-    (record, last.get())
-}
-
 #[test]
 fn a_controller_that_does_not_release_the_drive_is_an_error_and_the_bench_switches_it_off() {
     let scene = scene(&[]);
     let amplitude = scene.amplitude;
     let refused = |change: &dyn Fn(&mut Command, usize), words: &str| {
-        let (record, last) = run(
-            &scene,
-            |config| config,
-            |command, (active, asked)| {
-                if !active {
-                    change(command, asked);
-                }
-            },
-        );
+        let (record, last, _) = foreign(&scene, &scene.controller_config(), |command, (active, asked)| {
+            if !active {
+                change(command, asked);
+            }
+        });
         let message = record.unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
         assert_eq!(last, [0.0; 2], "{message}");
@@ -109,15 +59,11 @@ fn a_controller_that_does_not_release_the_drive_is_an_error_and_the_bench_switch
 fn a_decay_begins_at_the_end_of_the_ramp() {
     let scene = scene(&["record.decay_periods=60"]);
     let ramp = scene.plan().knowledge.samples(4.0);
-    let (record, _) = run(
-        &scene,
-        |config| config,
-        |command, (active, asked)| {
-            if !active {
-                command.drive.amplitude = scene.amplitude * (1.0 - (asked + 1) as f64 / ramp as f64).max(0.0);
-            }
-        },
-    );
+    let (record, ..) = foreign(&scene, &scene.controller_config(), |command, (active, asked)| {
+        if !active {
+            command.drive.amplitude = scene.amplitude * (1.0 - (asked + 1) as f64 / ramp as f64).max(0.0);
+        }
+    });
     let record = record.unwrap();
     assert_eq!(record.released - record.hold_end, ramp - 1);
     assert!(
@@ -127,30 +73,8 @@ fn a_decay_begins_at_the_end_of_the_ramp() {
             .all(|sample| sample.command.drive.amplitude == 0.0)
     );
     let found = identify(&record, &scene.plan()).unwrap();
-    let (first, points) = (found.decay.points[0], &found.decay.points);
+    let first = found.decay.points[0];
     assert!(first.c < 0.97 * found.lock.at.c, "{} {}", first.c, found.lock.at.c);
-    // Beside a run that is released at once.
-    let (at_once, _) = run(&scene, |config| config, |_, _| ());
-    let at_once = identify(&at_once.unwrap(), &scene.plan()).unwrap().decay.points;
-    let compared: Vec<_> = points.iter().filter(|point| point.c > 0.25).collect();
-    assert!(compared.len() > 15, "{}", compared.len());
-    for point in compared {
-        let near = at_once.windows(2).find(|pair| pair[1].c <= point.c).unwrap();
-        let share = (point.c - near[0].c) / (near[1].c - near[0].c);
-        let [sigma, rate] = [near[0].sigma + share * (near[1].sigma - near[0].sigma), near[1].rate];
-        assert!(
-            (point.sigma - sigma).abs() < 0.02,
-            "{} {sigma} at {}",
-            point.sigma,
-            point.c
-        );
-        assert!(
-            (point.rate / rate - 1.0).abs() < 0.1,
-            "{} {rate} at {}",
-            point.rate,
-            point.c
-        );
-    }
 }
 
 /// What is identified on a rig whose drive after the release, and whose readings, pass a function each; both take the samples since the release.
@@ -175,18 +99,14 @@ fn identified_on(
         };
         (if driven && is_off { goes_on } else { drive }, step)
     };
-    let mut rig = Altered {
-        rig: Simulated::of(scene).unwrap(),
-        read: Box::new(|sensors| Ok(read(sensors))),
-        drive: Box::new(drive),
-    };
+    let mut rig = Altered { drive: Box::new(drive), ..Altered::reading(scene, &mut read) };
     identify(&super::record(&mut rig, scene).unwrap(), &scene.plan())
 }
 
 #[test]
-fn a_decay_begins_where_the_measured_base_rests_within_the_noise_of_its_channel() {
+fn a_lock_is_at_the_requested_drive_and_its_decay_begins_where_the_base_rests_also_through_noise() {
     let floor = 1e-3 * scene(&[]).amplitude;
-    for snr in ["chain.snr=none", "chain.snr=40"] {
+    for snr in ["chain.snr=none", "chain.snr=60", "chain.snr=40"] {
         let scene = scene(&[snr]);
         let period = scene.plan().knowledge.samples(1.0) as f64;
         // A base that goes on has no free decay.
@@ -204,6 +124,11 @@ fn a_decay_begins_where_the_measured_base_rests_within_the_noise_of_its_channel(
         for (periods, [earliest, latest]) in [(0.0, [0.0, 0.2]), (10.0, [9.0, 10.5])] {
             let fades = |since: f64| (1.0 - since / (periods * period + 1.0)).max(0.0);
             let found = identified_on(&scene, fades, |sensors| sensors).unwrap();
+            assert!(
+                found.lock.at_requested_drive && found.decay.end != DecayEnd::Driven,
+                "{snr}: {:?}",
+                found.lock
+            );
             // A point is the middle of its window of 2.5 periods.
             let first = found.decay.points[0].t_s / scene.dimensionless().natural_period() - 1.25;
             assert!((earliest..=latest).contains(&first), "{snr}, {periods}: {first}");
@@ -233,14 +158,15 @@ fn a_decay_begins_where_the_measured_base_rests_within_the_noise_of_its_channel(
 fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
     let scene = scene(&["phase_lock.acquire_timeout=60"]);
     let said = |turned: f64, times: f64, settled: Option<bool>| {
-        let configure = |config: Config| Config {
+        let config = scene.controller_config();
+        let config = Config {
             phase_target: config.phase_target + turned * PI / 180.0,
             amplitude: times * config.amplitude,
             response_max: None,
             residual_max: None,
             ..config
         };
-        let (record, last) = run(&scene, configure, |command, _| command.settled = settled);
+        let (record, last, _) = foreign(&scene, &config, |command, _| command.settled = settled);
         let message = match record {
             Err(error) => error.to_string(),
             Ok(record) => match identify(&record, &scene.plan()) {
@@ -282,42 +208,38 @@ fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
 }
 
 #[test]
-fn a_lock_at_the_requested_drive_and_phase_says_so_through_noise() {
-    for snr in ["chain.snr=none", "chain.snr=60", "chain.snr=40"] {
-        let scene = scene(&[snr]);
-        let (record, _) = run(&scene, |config| config, |_, _| ());
-        let found = identify(&record.unwrap(), &scene.plan()).unwrap();
-        let (at, requested) = (found.lock.at, found.lock.requested_e_m);
-        assert!(
-            found.lock.at_requested_drive,
-            "{snr}: {} ± {} m, {requested} m",
-            at.e_m, at.u_e_m
-        );
-        assert!(TAU * at.f_hz > 0.0 && found.decay.end != DecayEnd::Driven);
-    }
-}
-
-#[test]
-fn a_loop_check_does_not_cut_the_stinger() {
-    let text = include_str!("../../../../scenes/shaker-cantilever.toml");
-    let scene = super::common::scene(text, &["shaker.release=cut", "start.dq2=0"]).unwrap();
-    let force = |is_checked: bool| {
-        let mut rig = Simulated::of(&scene).unwrap();
-        if is_checked {
-            check(rig.as_mut(), &scene.plan()).unwrap();
-        }
-        let drive = Drive {
-            omega: scene.dimensionless().omega0,
-            amplitude: scene.knowledge().target.units.command.of_metres(1e-6),
-            displacement: 0.0,
+fn neither_a_loop_check_nor_a_held_sample_of_zero_cuts_the_stinger() {
+    let scene = super::preset("shaker-cantilever", &["shaker.release=cut", "start.dq2=0"]).unwrap();
+    let (omega, step) = (scene.dimensionless().omega0, scene.sample_time());
+    // The largest force in 200 samples, in which every tenth drive is zero where samples are held.
+    let force = |rig: &mut dyn Rig, amplitude: f64, holds: bool| {
+        let amplitude = scene.knowledge().target.units.command.of_metres(amplitude);
+        let sample = |n: u32| {
+            let sine = if n.is_multiple_of(10) {
+                0.0
+            } else {
+                (0.06 * f64::from(n)).sin()
+            };
+            let displacement = if holds { amplitude * sine } else { 0.0 };
+            let drive = Drive { omega, amplitude, displacement };
+            let driven = if holds {
+                rig.hold(drive, step)
+            } else {
+                rig.advance(drive, step)
+            };
+            driven.and_then(|()| rig.sense()).unwrap().reference.unwrap().abs()
         };
-        let mut largest = 0.0_f64;
-        for _ in 0..200 {
-            rig.advance(drive, scene.sample_time()).unwrap();
-            largest = largest.max(rig.sense().unwrap().reference.unwrap().abs());
-        }
-        largest
+        (0..200).map(sample).fold(0.0, f64::max)
     };
-    let [fresh, checked] = [false, true].map(force);
+    let mut rig = Simulated::of(&scene).unwrap();
+    check(rig.as_mut(), &scene.plan()).unwrap();
+    let checked = force(&mut *rig, 1e-6, false);
+    let mut rig = Simulated::of(&scene).unwrap();
+    let fresh = force(&mut *rig, 1e-6, false);
     assert!((checked / fresh - 1.0).abs() < 0.5, "{fresh:e} {checked:e} N");
+    let [driven, again, released] = [1e-6, 1e-6, 0.0].map(|amplitude| force(&mut *rig, amplitude, true));
+    assert!(
+        again > 0.1 * driven && released < 1e-6 * driven,
+        "{driven:e} {again:e} {released:e}"
+    );
 }

@@ -10,12 +10,10 @@ use phase_lock::Config;
 use vines_bench::experiment::{self, ExperimentError};
 use vines_bench::identification::{IdentificationError, identify};
 use vines_bench::record::Record;
-use vines_bench::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, RigError, RigFault, SensorFault, Sensors, Simulated, faulty,
-};
+use vines_bench::rig::{Command, ControllerError, Drive, RigError, RigFault, SensorFault, Simulated, faulty};
 use vines_bench::scene::Scene;
 
-use super::{Altered, checked, paper as scene, record, tracked};
+use super::{Altered, Asked, Foreign, checked, foreign, paper as scene, record, record_of, tracked, tracked_of};
 
 /// Time from a fault to a drive of zero, s, and whether the run ended early.
 fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Option<f64>, bool) {
@@ -35,10 +33,10 @@ fn injected(scene: &Scene, fault: RigFault, seconds: f64, tracks: bool) -> (Opti
 /// seconds and the ramp.
 fn inject(settings: &[&str], instants: usize, limit: f64) {
     let scene = scene(&[settings, &["phase_lock.release_rate=4.1e-4", "record.decay_periods=6"]].concat());
-    let record = healthy(&scene);
+    let record = record_of(&scene);
     let (step, period) = (record.sample_time, scene.dimensionless().natural_period());
     let [settled, released] = [record.settled, record.released].map(|sample| sample as f64 * step);
-    let tracked = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+    let tracked = tracked_of(&scene);
     let tracking = (tracked.periods_to_lock + 40.0) * period;
     let config = scene.controller_config();
     let ramp = config
@@ -126,21 +124,10 @@ fn an_impact_on_a_small_response_and_the_acceleration_of_a_base_whose_drive_chan
     }
 }
 
-/// A controller that fails at a sample.
-struct Broken(BuiltIn, usize, fn(Command) -> Result<Command, ControllerError>);
-
-impl Controller for Broken {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        self.1 = self.1.saturating_sub(1);
-        let command = self.0.sample(sensors, active)?;
-        if self.1 == 0 { (self.2)(command) } else { Ok(command) }
-    }
-}
-
 #[test]
 fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() {
     let scene = scene(&[]);
-    let ends = |fails: fn() -> Result<(), RigError>, breaks: fn(Command) -> Result<Command, ControllerError>| {
+    let ends = |fails: fn() -> Result<(), RigError>, breaks: fn(&mut Command) -> Result<(), ControllerError>| {
         let (mut sample, last) = (0, Cell::new(f64::NAN));
         let read = |sensors| {
             sample += 1;
@@ -154,64 +141,37 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
             last.set(drive.amplitude);
             (drive, step)
         };
-        let rig = Simulated::of(&scene).unwrap();
-        let mut rig = Altered { rig, read: Box::new(read), drive: Box::new(drive) };
-        let mut controller = Broken(BuiltIn::new(&scene.controller_config()).unwrap(), 2000, breaks);
+        let mut rig = Altered { read: Box::new(read), ..Altered::driven(&scene, drive) };
+        let answer = |command: &mut Command, (_, sample): Asked| if sample < 2000 { Ok(()) } else { breaks(command) };
+        let mut controller = Foreign::new(&scene.controller_config(), answer);
         let run = || experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
         let ended = catch_unwind(AssertUnwindSafe(run));
         assert_eq!(last.get(), 0.0);
         ended
     };
-    let ended = ends(|| Err(RigError::Failed("the connection is lost".into())), Ok);
+    let ended = ends(|| Err(RigError::Failed("the connection is lost".into())), |_| Ok(()));
     assert!(matches!(ended, Ok(Err(ExperimentError::Rig(_)))));
-    assert!(ends(|| panic!("injected"), Ok).is_err());
-    let lost = |_| Err(ControllerError::Failed("the connection is lost".into()));
+    assert!(ends(|| panic!("injected"), |_| Ok(())).is_err());
+    let lost = |_: &mut Command| Err(ControllerError::Failed("the connection is lost".into()));
     assert!(matches!(ends(|| Ok(()), lost), Ok(Err(ExperimentError::Controller(_)))));
-    let nan = |Command { drive, .. }| {
-        let drive = Drive { amplitude: f64::NAN, ..drive };
-        Ok(Command { drive, ..Command::default() })
+    let nan = |command: &mut Command| {
+        command.drive.amplitude = f64::NAN;
+        Ok(())
     };
     let ended = ends(|| Ok(()), nan);
     assert!(matches!(ended, Ok(Err(ExperimentError::Command { name: "E", .. }))));
 }
 
-/// The built-in controller with another answer, which does not say whether it has locked.
-struct Foreign(BuiltIn, usize, fn(&mut Command, usize));
-
-impl Controller for Foreign {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        let mut command = Command {
-            settled: None,
-            state: None,
-            ..self.0.sample(sensors, active)?
-        };
-        self.1 += 1;
-        (self.2)(&mut command, self.1);
-        Ok(command)
-    }
-}
-
-/// An experiment with such a controller, and the largest drive that reached the rig, m.
-fn foreign(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, ExperimentError>, f64) {
-    let largest = Cell::new(0.0);
-    let drive = |drive: Drive, step| {
-        largest.set(drive.amplitude.max(largest.get()));
-        (drive, step)
-    };
-    let mut rig = Altered {
-        rig: Simulated::of(scene).unwrap(),
-        read: Box::new(Ok),
-        drive: Box::new(drive),
-    };
+/// An experiment with a controller without limits and with another answer, and the largest drive that reached the rig, m.
+fn unlimited(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, ExperimentError>, f64) {
     let limits = Config {
         amplitude_max: None,
         response_max: None,
         residual_max: None,
         ..scene.controller_config()
     };
-    let mut controller = Foreign(BuiltIn::new(&limits).unwrap(), 0, change);
-    let record = experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
-    (record, largest.get())
+    let (record, _, largest) = foreign(scene, &limits, |command, (_, sample)| change(command, sample));
+    (record, largest)
 }
 
 #[test]
@@ -219,7 +179,7 @@ fn the_limits_of_the_scene_guard_the_rig_whatever_controls_it() {
     let scene = scene(&[]);
     let limit = scene.controller_config().amplitude_max.unwrap();
     let refused = |scene: &Scene, change, words: &str| {
-        let (record, largest) = foreign(scene, change);
+        let (record, largest) = unlimited(scene, change);
         let message = record.unwrap_err().to_string();
         assert!(message.contains(words) && largest <= limit, "{message} {largest}");
     };
@@ -241,7 +201,7 @@ fn the_limits_of_the_scene_guard_the_rig_whatever_controls_it() {
 
 #[test]
 fn the_bench_judges_a_lock_through_noise_by_what_the_response_shows_of_it() {
-    let settled = |settings: &[&str], change| foreign(&scene(settings), change).0.map(|record| record.settled);
+    let settled = |settings: &[&str], change| unlimited(&scene(settings), change).0.map(|record| record.settled);
     let silent = settled(&[], |_, _| ()).unwrap();
     for snr in ["chain.snr=80", "chain.snr=60", "chain.snr=40"] {
         let noisy = settled(&[snr], |_, _| ()).unwrap();
@@ -260,17 +220,12 @@ fn refused(scene: &Scene, fault: RigFault, seconds: f64) -> IdentificationError 
     identify(&failed, &checked(scene)).unwrap_err()
 }
 
-/// The record of the rig of a scene without faults.
-fn healthy(scene: &Scene) -> Record {
-    record(&mut *Simulated::of(scene).unwrap(), scene).unwrap()
-}
-
 #[test]
 fn a_sensor_that_dies_after_the_release_or_becomes_late_in_the_hold_is_an_error() {
     use {RigFault::*, SensorFault::*};
     for settings in [&[][..], &["chain.adc_bits=14"], &["chain.snr=40"]] {
         let scene = scene(settings);
-        let healthy = healthy(&scene);
+        let healthy = record_of(&scene);
         identify(&healthy, &checked(&scene)).unwrap();
         let release = healthy.released as f64 * healthy.sample_time;
         for fault in [
@@ -285,7 +240,7 @@ fn a_sensor_that_dies_after_the_release_or_becomes_late_in_the_hold_is_an_error(
         }
     }
     let scene = scene(&[]);
-    let healthy = healthy(&scene);
+    let healthy = record_of(&scene);
     let settled = (healthy.settled + 2) as f64 * healthy.sample_time;
     let error = refused(&scene, Base(Late(3)), settled);
     assert!(matches!(error, IdentificationError::OffTarget { .. }), "{error}");

@@ -1,27 +1,63 @@
 //! Guards the bench without its fit. Each file has the tests of one part; what several of them need is here.
 
+mod backbone;
 #[path = "../../../../studies/common.rs"]
 mod common;
 mod controllers;
 mod faults;
+mod identification;
 mod loop_check;
 mod measuring;
 mod scenes;
 mod shakers;
 mod structures;
 
+use phase_lock::Config;
 use vines_bench::backbone::{Tracked, track};
 use vines_bench::experiment::{ExperimentError, run};
 use vines_bench::identification::{Identification, IdentificationError, identify};
 use vines_bench::linear::LinearResponse;
 use vines_bench::plan::Plan;
 use vines_bench::record::Record;
-use vines_bench::rig::{BuiltIn, Drive, Rig, RigError, RigStage, Sensors, Simulated};
-use vines_bench::scene::Scene;
+use vines_bench::rig::{
+    BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, RigStage, Sensors, Simulated,
+};
+use vines_bench::scene::{Override, Scene, SceneError};
 
 /// The default scene with these settings.
 fn paper(settings: &[&str]) -> Scene {
     common::scene("", settings).unwrap()
+}
+
+/// The dimensionless scene with these settings, which spaces separate.
+fn dimensionless(settings: &str) -> Scene {
+    preset("dimensionless", &settings.split_whitespace().collect::<Vec<_>>()).unwrap()
+}
+
+/// A preset of `scenes/` with these settings.
+fn preset(name: &str, settings: &[&str]) -> Result<Scene, SceneError> {
+    let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let settings: Vec<Override> = settings.iter().map(|one| one.parse().unwrap()).collect();
+    Scene::load(Some(file.as_ref()), &settings)
+}
+
+/// A text with replacements of its parts: `text -> replacement ;; text -> replacement`.
+fn changed(text: &str, changes: &str) -> String {
+    let changes = changes.replace("\\n", "\n");
+    let pairs = changes.split(" ;; ").filter_map(|pair| pair.split_once(" -> "));
+    pairs.fold(text.to_string(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    })
+}
+
+/// A refusal has these parts, which `|` separates.
+fn says(result: Result<Scene, SceneError>, parts: &str) -> String {
+    let message = result.expect_err(parts).to_string();
+    for part in parts.split(" | ") {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+    message
 }
 
 /// The experiment on a rig whose linear response is known as a loop check finds it.
@@ -51,22 +87,90 @@ impl RigStage for Altered<'_> {
     }
 }
 
+impl<'a> Altered<'a> {
+    /// The rig of a scene whose readings pass a function.
+    fn reading(scene: &Scene, mut read: impl FnMut(Sensors) -> Sensors + 'a) -> Self {
+        let (rig, drive) = (Simulated::of(scene).unwrap(), Box::new(|drive, step| (drive, step)));
+        Self { rig, read: Box::new(move |sensors| Ok(read(sensors))), drive }
+    }
+
+    /// The rig of a scene whose drives pass a function.
+    fn driven(scene: &Scene, drive: impl FnMut(Drive, f64) -> (Drive, f64) + 'a) -> Self {
+        Self {
+            drive: Box::new(drive),
+            ..Self::reading(scene, |sensors| sensors)
+        }
+    }
+}
+
+/// What a controller is asked for: whether to drive, and for how many samples it has been asked this.
+type Asked = (bool, usize);
+
+/// The built-in controller with another answer, and without the control of the response. It does not say whether it has locked.
+struct Foreign<F>(BuiltIn, F, Asked);
+
+impl<F> Foreign<F> {
+    fn new(config: &Config, answer: F) -> Self {
+        Self(BuiltIn::new(config).unwrap(), answer, (true, 0))
+    }
+}
+
+impl<F: FnMut(&mut Command, Asked) -> Result<(), ControllerError>> Controller for Foreign<F> {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let (before, samples) = self.2;
+        self.2 = (active, if before == active { samples + 1 } else { 0 });
+        let command = self.0.sample(sensors, active)?;
+        let mut command = Command { settled: None, state: None, ..command };
+        (self.1)(&mut command, self.2)?;
+        Ok(command)
+    }
+}
+
+/// An experiment with a controller of this configuration with another answer; amplitude and displacement of the last drive that reached the rig, m, and
+/// the largest amplitude.
+fn foreign(
+    scene: &Scene,
+    config: &Config,
+    mut change: impl FnMut(&mut Command, Asked),
+) -> (Result<Record, ExperimentError>, [f64; 2], f64) {
+    let (mut last, mut largest) = ([f64::NAN; 2], 0.0_f64);
+    let mut rig = Altered::driven(scene, |drive, step| {
+        last = [drive.amplitude, drive.displacement];
+        largest = largest.max(drive.amplitude);
+        (drive, step)
+    });
+    let mut controller = Foreign::new(config, |command: &mut Command, asked| {
+        change(command, asked);
+        Ok(())
+    });
+    let record = run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+    drop(rig);
+    (record, last, largest)
+}
+
 /// The record of an experiment.
 fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     run(rig, &mut controller, &scene.plan(), |_, _, _| {})
 }
 
+/// The record of the rig of a scene.
+fn record_of(scene: &Scene) -> Record {
+    record(&mut *Simulated::of(scene).unwrap(), scene).unwrap()
+}
+
 /// What is identified on the simulated rig of a scene.
 fn identified(scene: &Scene) -> Result<Identification, IdentificationError> {
-    identify(
-        &record(&mut *Simulated::of(scene).unwrap(), scene).unwrap(),
-        &scene.plan(),
-    )
+    identify(&record_of(scene), &scene.plan())
 }
 
 /// The tracked backbone.
 fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Result<Tracked, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     track(rig, &mut controller, &checked(scene), |_, _| {})
+}
+
+/// The tracked backbone of the rig of a scene.
+fn tracked_of(scene: &Scene) -> Tracked {
+    tracked(&mut *Simulated::of(scene).unwrap(), scene).unwrap()
 }

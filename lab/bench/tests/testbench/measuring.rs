@@ -4,7 +4,6 @@
 
 use std::cell::Cell;
 use std::f64::consts::TAU;
-use std::path::Path;
 
 use lovines::{Restitution, State};
 use phase_lock_f32 as single;
@@ -12,25 +11,22 @@ use vines_bench::backbone::LevelPoint;
 use vines_bench::comparison::{COMPARED_ABOVE, ExactCurve};
 use vines_bench::experiment::{ExperimentError, SearchFound};
 use vines_bench::identification::{
-    DECAY_WINDOW, IdentificationError, Lock, Regime, ResonancePoint, decay_points, foreign_tone, identify,
-    regime_by_response,
+    DECAY_WINDOW, IdentificationError, Lock, Regime, ResonancePoint, decay_points, identify,
 };
 use vines_bench::loop_check::check;
-use vines_bench::record::{Record, Sample};
+use vines_bench::record::Record;
 use vines_bench::rig::{
     BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated,
 };
 use vines_bench::scene::{Dimensionless, Scene};
-use vines_model::numerics::{Estimate, mean_square};
+use vines_model::numerics::mean_square;
 use vines_model::orbit::phase_resonant;
 
 use super::common::{self, crossings, noisy, rig_with_stable_orbit, uniform};
-use super::{Altered, checked, identified, paper, record, tracked};
-
-/// The dimensionless default scene with these settings.
-fn dimensionless(settings: &[&str]) -> Scene {
-    common::scene(include_str!("../../../../scenes/dimensionless.toml"), settings).unwrap()
-}
+use super::structures::BEAM;
+use super::{
+    Altered, changed, checked, dimensionless, identified, paper, preset, record, record_of, tracked, tracked_of,
+};
 
 /// The lock of an experiment with the plant of a scene.
 fn lock(scene: &Scene) -> Lock {
@@ -126,28 +122,15 @@ fn the_noise_of_a_sensor_is_the_same_at_rest_at_a_hundredth_of_the_drive_at_the_
     let by_force = paper(&["chain.snr=40", "resonance.reference=force"]);
     are(&noise_of(&by_force), [2.828e-5, 7.071e-3 * drive]);
     // Behind the force of 1.2 N on a structure, whose sensor reads a third of the motion at the cavity.
-    let structure = common::scene(FORCED, &["chain.snr=40"]).unwrap();
+    let structure = forced(&["chain.snr=40"]);
     are(&noise_of(&structure), [2.828e-5 / 3.0, 7.071e-3 * 1.2]);
 }
 
-/// A beam under a force, whose sensor reads a third of the motion at the cavity.
-const FORCED: &str = "\
-[plant]
-m = 0.032
-b = 0.01
-r = 0.65
-[structure]
-excitation = \"force\"
-cavity = \"tip\"
-sensor = \"middle\"
-drive = \"root\"
-modes = [
-    { frequency = 8.8156, damping = 0.006, shape = { root = 0.1, tip = 0.51, middle = 0.17 } },
-    { frequency = 55.274, damping = 0.006, shape = { root = 0.3, tip = -0.51, middle = 0.4 } },
-]
-[excitation]
-F = 1.2
-";
+/// The beam under its force, whose sensor reads a third of the motion at the cavity.
+fn forced(settings: &[&str]) -> Scene {
+    let sensor = "drive = -> sensor = \"middle\"\ndrive = ;; 0.51252 -> 0.51 ;; middle = 0.0 -> middle = 0.17";
+    common::scene(&changed(BEAM, sensor), settings).unwrap()
+}
 
 #[test]
 fn keys_in_si_units_replace_the_noise_of_their_channel_whatever_it_measures() {
@@ -175,17 +158,12 @@ fn keys_in_si_units_replace_the_noise_of_their_channel_whatever_it_measures() {
     are(&noisy(&by_force), [0.0, 0.02 / 11_680.84]);
     // As stated, in the units of the channels of a structure.
     let settings = ["chain.response_noise=1e-5", "chain.reference_noise=0.02"];
-    let structure = common::scene(FORCED, &settings).unwrap();
-    are(&noise_of(&structure), [1e-5, 0.02]);
+    are(&noise_of(&forced(&settings)), [1e-5, 0.02]);
 }
 
 /// The lock behind the chain of a scene, held for 200 periods.
 fn at(settings: &str) -> Result<ResonancePoint, ExperimentError> {
-    let settings: Vec<&str> = ["record.hold_periods=200"]
-        .into_iter()
-        .chain(settings.split_whitespace())
-        .collect();
-    let scene = dimensionless(&settings);
+    let scene = dimensionless(&format!("record.hold_periods=200 {settings}"));
     let record = record(&mut *Simulated::of(&scene).unwrap(), &scene)?;
     Ok(identify(&record, &scene.plan()).unwrap().lock.at)
 }
@@ -262,10 +240,7 @@ fn an_asymmetric_motion_is_none_of_noise_whatever_the_sensor_measures() {
         "backbone.C_from=0.75",
         "backbone.points=1",
     ]);
-    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-    let [level] = &levels.points[..] else {
-        panic!("{levels:?}")
-    };
+    let level = tracked_of(&scene).points[0];
     assert_eq!(
         [Some(level.regime), level.regime_by_impacts],
         [Some(Regime::Asymmetric); 2]
@@ -278,8 +253,7 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
     let rig = ["plant.m=0.04993", "plant.c=5.044", "plant.r=0.805", "backbone.points=1"];
     for reference in ["chain.reference=true", "chain.reference=false"] {
         let scene = paper(&[&rig[..], &[reference]].concat());
-        let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-        let at = levels.points[0].at;
+        let at = tracked_of(&scene).points[0].at;
         let [sigma, _] = ExactCurve::of(&scene.dimensionless()).at(at.c).unwrap();
         assert!(
             (at.sigma - sigma).abs() < 3.0 * at.u_sigma,
@@ -289,8 +263,8 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
 }
 
 #[test]
-fn noise_behind_an_anti_alias_filter_keeps_neither_a_lock_nor_a_level_from_settling() {
-    let curve = ExactCurve::of(&dimensionless(&[]).dimensionless());
+fn neither_noise_behind_a_filter_nor_an_accelerometer_of_a_base_whose_drive_changes_keeps_the_loop_from_settling() {
+    let curve = ExactCurve::of(&dimensionless("").dimensionless());
     for settings in [
         "chain.filter=10 chain.snr=40",
         "chain.filter=4 chain.snr=40",
@@ -304,33 +278,19 @@ fn noise_behind_an_anti_alias_filter_keeps_neither_a_lock_nor_a_level_from_settl
             "{settings}: {distance:?}, {filtered:?}"
         );
     }
-    let scene = paper(&[
-        "chain.filter=10",
-        "chain.snr=40",
-        "backbone.points=2",
-        "backbone.C_to=0.4",
-    ]);
-    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-    assert!(levels.points.iter().all(|point| point.settled), "{:?}", levels.points);
-}
-
-#[test]
-fn what_an_accelerometer_of_the_base_shows_of_a_change_of_the_drive_does_not_keep_the_loop_from_its_phase() {
-    // The drive is asked to change before the last change is forgotten.
-    let scene = paper(&[
-        "plant.m=0.05061",
-        "plant.c=2.711",
-        "plant.r=0.706",
-        "excitation.G=1.365",
-        "resonance.sensor=q1",
-        "resonance.sensor_quantity=velocity",
-        "resonance.reference_quantity=acceleration",
-        "controller.samples_per_period=400",
-        "backbone.C_from=0.56",
-        "backbone.points=1",
-    ]);
-    let levels = tracked(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
-    assert!(levels.points.iter().all(|point| point.settled), "{:?}", levels.points);
+    for settings in [
+        "chain.filter=10 chain.snr=40 backbone.points=2 backbone.C_to=0.4",
+        // The drive is asked to change before the accelerometer of the base has forgotten the last change.
+        "plant.m=0.05061 plant.c=2.711 plant.r=0.706 excitation.G=1.365 resonance.sensor=q1 resonance.sensor_quantity=velocity \
+         resonance.reference_quantity=acceleration controller.samples_per_period=400 backbone.C_from=0.56 backbone.points=1",
+    ] {
+        let levels = tracked_of(&paper(&settings.split_whitespace().collect::<Vec<_>>()));
+        assert!(
+            levels.points.iter().all(|point| point.settled),
+            "{settings}: {:?}",
+            levels.points
+        );
+    }
 }
 
 /// A rig without an input for samples of the base, counting what it reads.
@@ -349,7 +309,7 @@ impl Rig for Counter {
 
 #[test]
 fn a_delay_keeps_the_order_of_both_sensors_and_held_samples_need_an_input_for_them() {
-    let chain = |setting| Chain::around(Box::new(Counter(0.0)), &dimensionless(&[setting]));
+    let chain = |setting| Chain::around(Box::new(Counter(0.0)), &dimensionless(setting));
     let mut late = chain("chain.delay=2");
     for value in [0.0, 0.0, 1.0, 2.0, 3.0] {
         let Sensors { response, reference } = late.sense().unwrap();
@@ -363,7 +323,7 @@ fn a_delay_keeps_the_order_of_both_sensors_and_held_samples_need_an_input_for_th
 
 #[test]
 fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04() {
-    let scene = dimensionless(&[]);
+    let scene = dimensionless("");
     let clean = record(&mut Simulated::new(scene.plant, scene.start).unwrap(), &scene).unwrap();
     let truth = crossings(&clean, &scene);
     let rms = |record: &Record| {
@@ -379,7 +339,7 @@ fn along_the_decay_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04
     // The zero crossings that the fit is compared with do not depend on the sample time: here of every fourth sample.
     let last = decay_points(&clean, &scene.knowledge(), DECAY_WINDOW).points;
     let last = last.iter().rfind(|point| point.c > COMPARED_ABOVE).unwrap().tau;
-    let scene = dimensionless(&["controller.samples_per_period=400"]);
+    let scene = dimensionless("controller.samples_per_period=400");
     let fine = record(&mut Simulated::new(scene.plant, scene.start).unwrap(), &scene).unwrap();
     let coarse = Record {
         sample_time: 4.0 * fine.sample_time,
@@ -524,15 +484,12 @@ fn a_response_that_creeps_below_the_fold_behind_noise_is_a_point_of_the_backbone
     ];
     for (numbers, seed) in [(fast, 1), (fast, 2), (fast, 3), (slow, 28)] {
         let names = ["plant.epsilon", "plant.lambda", "plant.r", "excitation.G", "chain.snr"];
-        let mut settings: Vec<String> = names
+        let numbers = names
             .iter()
             .zip(numbers)
-            .map(|(name, value)| format!("{name}={value}"))
-            .collect();
-        settings.extend(["start.dq2=0", "controller.omega_min=0.8", "controller.omega_max=1.2"].map(String::from));
-        settings.extend([format!("chain.seed={seed}"), "record.decay_periods=3".into()]);
-        let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-        let scene = dimensionless(&settings);
+            .map(|(name, value)| format!("{name}={value} "));
+        let rest = "start.dq2=0 controller.omega_min=0.8 controller.omega_max=1.2 record.decay_periods=3";
+        let scene = dimensionless(&format!("{}{rest} chain.seed={seed}", numbers.collect::<String>()));
         let at = lock(&scene).at;
         let distance = ExactCurve::of(&scene.dimensionless()).distance(at.c, at.sigma, at.g);
         let u = at.u_c.max(at.u_sigma).max(at.u_g);
@@ -583,10 +540,9 @@ fn difficult_rigs_lock_from_rest_on_their_symmetric_motion() {
 #[test]
 fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
     for name in ["skewed", "rough", "viscoelastic", "vertical"] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/{name}.toml"));
-        let scene = Scene::load(Some(&path), &["record.decay_periods=3".parse().unwrap()]).unwrap();
+        let scene = preset(name, &["record.decay_periods=3"]).unwrap();
         assert_eq!(scene.start, State::default(), "{name} does not start from rest");
-        let record = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap();
+        let record = record_of(&scene);
         let lock = identify(&record, &scene.plan()).unwrap().lock;
         let expected = if name == "vertical" {
             Regime::Asymmetric
@@ -624,41 +580,21 @@ fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
     }
 }
 
-#[test]
-fn a_particle_that_sticks_is_counted_and_timed() {
-    // With this much friction the particle rides on the floor for a part of every period.
-    let scene = paper(&["plant.mu_k=0.4", "excitation.G=2", "start.dq2=1.0"]);
-    let mut rig = Simulated::of(&scene).unwrap();
-    let omega = 0.98 * scene.dimensionless().omega0;
-    let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
-    for _ in 0..5000 {
-        rig.advance(drive, scene.sample_time()).unwrap();
-    }
-    let friction = rig.ground_truth().unwrap().unwrap().friction.unwrap();
-    assert!(friction.sticks > 1 && friction.loss > 0.0, "{friction:?}");
-    let share = friction.stuck_time / (5000.0 * scene.sample_time());
-    assert!(share > 0.0 && share < 0.5, "{friction:?}");
-}
-
 // Foreign tones on the response sensor.
 
 /// The rig of a scene without ground truth, whose response sensor reads tones, too: hertz and metres.
 fn rig<'a>(scene: &Scene, tones: &'a [(f64, f64)]) -> Altered<'a> {
     let (step, mut time) = (scene.sample_time(), 0.0);
-    let read = move |sensors: Sensors| {
+    let shown = Altered::reading(scene, move |sensors: Sensors| {
         let tones = tones
             .iter()
             .map(|(hertz, size)| size * (TAU * hertz * time + 1.0).sin());
         let response = sensors.response + tones.sum::<f64>();
         time += step;
-        Ok(Sensors { response, ..sensors })
-    };
+        Sensors { response, ..sensors }
+    });
     let rig = SensorsOnly::around(Simulated::of(scene).unwrap());
-    Altered {
-        rig: Box::new(rig),
-        read: Box::new(read),
-        drive: Box::new(|drive, step| (drive, step)),
-    }
+    Altered { rig: Box::new(rig), ..shown }
 }
 
 /// Mains hum and a ripple with harmonics: hertz, and share of a response of C = 0.55.
@@ -766,63 +702,17 @@ fn a_response_that_repeats_after_two_to_four_periods_is_not_called_1_1_also_thro
             let turns = Cell::new(0.0);
             // The impacts stay even: only the response shows it.
             let line = |turns: f64| 5e-4 * scene.plant.half_width * (TAU * turns / periods as f64).sin();
-            let mut rig = Altered {
-                rig: Simulated::of(&scene).unwrap(),
-                read: Box::new(|sensors| Ok(Sensors { response: sensors.response + line(turns.get()), ..sensors })),
-                drive: Box::new(|drive, step| {
-                    turns.set(turns.get() + drive.omega * step / TAU);
-                    (drive, step)
-                }),
+            let drive = |drive: Drive, step| {
+                turns.set(turns.get() + drive.omega * step / TAU);
+                (drive, step)
             };
+            let read = |sensors: Sensors| Sensors { response: sensors.response + line(turns.get()), ..sensors };
+            let mut rig = Altered { drive: Box::new(drive), ..Altered::reading(&scene, read) };
             let found = identify(&record(&mut rig, &scene).unwrap(), &scene.plan());
             let is_named = matches!(found, Err(IdentificationError::Subharmonic { periods: n, .. }) if n == periods);
             assert!(is_named, "{periods}: {found:?}");
         }
     }
-}
-
-const QUANTITIES: [&str; 3] = ["displacement", "velocity", "acceleration"];
-
-#[test]
-fn no_motion_of_a_particle_is_a_foreign_tone() {
-    let mut irregular = 0;
-    // Values that fill their intervals evenly.
-    for n in 0..60 {
-        let share = |k: u32| (0.5 + f64::from(n) * 0.754_877_666_246_692_7_f64.powi(k as i32)).fract();
-        let between = |k: u32, low: f64, high: f64| low * (high / low).powf(share(k));
-        let settings = [
-            format!("plant.m={}", 3.807 * between(1, 0.001, 0.05)),
-            format!("plant.r={}", 0.3 + 0.65 * share(2)),
-            format!("excitation.G={}", between(3, 0.1, 4.0)),
-            format!("resonance.sensor={}", if n % 4 == 0 { "v" } else { "q1" }),
-            format!(
-                "resonance.sensor_quantity={}",
-                QUANTITIES[n as usize % 4 - usize::from(n % 4 > 0)]
-            ),
-        ];
-        let scene = paper(&settings.each_ref().map(String::as_str));
-        let omega = scene.dimensionless().omega(6.0 * share(4) - 3.0);
-        let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
-        let knowledge = checked(&scene).knowledge;
-        let step = scene.sample_time();
-        let mut rig = rig(&scene, &[]);
-        let samples: Vec<Sample> = (0..6000)
-            .map(|n| {
-                let (time, sensors) = (step * f64::from(n), knowledge.target.scaled(rig.sense().unwrap()));
-                rig.advance(drive, step).unwrap();
-                let command = Command { drive, ..Command::default() };
-                Sample { time, sensors, command, ..Sample::default() }
-            })
-            .collect();
-        // The first of these windows contains the transient.
-        for window in [&samples[1000..3000], &samples[4000..]] {
-            assert_eq!(foreign_tone(window, &knowledge, drive.omega), None, "{settings:?}");
-            let exact = |value| Estimate { value, uncertainty: 0.0 };
-            let regime = regime_by_response(window, &knowledge, exact(drive.amplitude), exact(drive.omega));
-            irregular += usize::from(regime == Regime::Other);
-        }
-    }
-    assert!(irregular >= 30);
 }
 
 // How fast the phase locks, and single precision.

@@ -78,7 +78,7 @@ impl SceneShaker {
 
     /// The reference in the sections of the host: the displacement of the table, or the force of the stinger; and the inertia that is subtracted from
     /// it, per negative acceleration.
-    pub fn reference_and_inertia(&self, excitation: Excitation) -> [Row; 2] {
+    pub(super) fn reference_and_inertia(&self, excitation: Excitation) -> [Row; 2] {
         let end = &self.rows.end;
         let inertia = end.iter().map(|pair| pair.map(|value| self.compensated_mass * value));
         match excitation {
@@ -173,7 +173,7 @@ impl Structure {
 
     /// A limit of the shaker that the drive needs more than, in a sentence: `amplitude`, m, of the base or of the oscillator's, at a response at the cavity,
     /// m, that lags by a quarter of a period. The command and a force at the cavity, which the impacts are, make both at the natural frequency.
-    pub fn beyond_limits(&self, amplitude: f64, response: f64) -> Option<String> {
+    pub(super) fn beyond_limits(&self, amplitude: f64, response: f64) -> Option<String> {
         let shaker = self.shaker.as_ref()?;
         let (omega, asked) = (self.mode().omega, self.units().reference.of_metres(amplitude));
         let of = |row: &Row| {

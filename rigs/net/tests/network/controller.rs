@@ -5,11 +5,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::Duration;
 
-use vines_bench::rig::{BuiltIn, Command, Controller, LoopState, Move, Rig, Sensors, Simulated};
-use vines_bench::scene::Scene;
+use vines_bench::rig::{Command, Controller, LoopState, Move, Sensors};
 use vines_net::{Ended, LinkError};
 
-use crate::{Answers, PATIENT, SCENE, Served, drive, scene, serve_built_in, serve_controller};
+use crate::{Answers, PATIENT, SCENE, Served, drive, serve_built_in, serve_controller};
 
 fn reading(n: usize) -> Sensors {
     Sensors { response: n as f64, reference: None }
@@ -94,33 +93,6 @@ fn a_controller_that_reports_no_state_does_not_judge_its_lock() {
         let settled = server.controller(None).sample(reading(0), true).unwrap().settled;
         assert_eq!(settled, expected);
     }
-}
-
-/// Drives the plant with a controller, moves the response at half the samples, and returns the commands.
-fn moved(scene: &Scene, controller: &mut dyn Controller, samples: usize) -> Vec<Command> {
-    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let response = 0.6 * scene.plant.half_width;
-    let [duration, amplitude, omega] = [2.0, -1e-6, 0.01];
-    let mut sample = |n| {
-        if n == samples / 2 {
-            let to = Move { response, duration, amplitude, omega, growth: 0.0 };
-            controller.hold_response(to, -1.5).unwrap();
-        }
-        let command = controller.sample(rig.sense().unwrap(), true).unwrap();
-        rig.advance(command.drive, scene.sample_time()).unwrap();
-        command
-    };
-    (0..samples).map(&mut sample).collect()
-}
-
-#[test]
-fn the_response_is_controlled_across_the_network_with_the_same_bits() {
-    let scene = scene(&["phase_lock.harmonics=4", "phase_lock.base_bandwidth=0.5"]);
-    let far = moved(&scene, &mut serve_built_in(&scene).controller(None), 4000);
-    let near = moved(&scene, &mut BuiltIn::new(&scene.controller_config()).unwrap(), 4000);
-    assert_eq!(far, near);
-    // The move did something.
-    assert!(far[3999].drive.amplitude != far[1999].drive.amplitude);
 }
 
 #[test]

@@ -9,13 +9,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, sleep};
 use std::time::Duration;
 
-use vines_bench::experiment::{self, ExperimentError};
-use vines_bench::rig::{Command, Drive, Rig};
+use vines_bench::rig::{Drive, Rig};
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, Counters, Ended, LinkError, NetRig, RAMP_SAMPLES, ReportLost, Session, Timing};
 
 use crate::fixture::socket;
-use crate::{Answers, PATIENT, SCENE, drive, link_error, serve_controller, serve_rig, shake};
+use crate::{PATIENT, SCENE, drive, link_error, serve_rig, shake};
 
 /// Treatment of a datagram by a proxy.
 #[derive(Clone, Copy)]
@@ -275,28 +274,4 @@ fn a_client_that_falls_behind_is_shut_down_and_no_drive_older_than_the_silence_i
         let age = n as f64 - 1024.0 * (had.omega - 50.0);
         assert!(had.amplitude < 1e-4 || age <= oldest, "sample {n}: {age} samples old");
     }
-}
-
-#[test]
-fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
-    let rig_server = serve_rig(Address::Udp, &SCENE, PATIENT);
-    // It answers 200 readings, and hangs at the next until the experiment is over.
-    let (mut left, is_over) = (200_usize, Arc::new(AtomicBool::new(false)));
-    let ended = Arc::clone(&is_over);
-    let stops = Answers(move |_| {
-        while left == 0 && !ended.load(Ordering::Relaxed) {
-            sleep(Duration::from_millis(1));
-        }
-        left = left.saturating_sub(1);
-        Command { drive: drive(left), ..Command::default() }
-    });
-    let controller_server = serve_controller(&SCENE, 10.0, stops);
-    let (mut rig, mut peer) = (rig_server.rig(), controller_server.controller(Some(PATIENT)));
-    let outcome = experiment::run(&mut rig, &mut peer, &SCENE.plan(), |_, _, _| {});
-    is_over.store(true, Ordering::Relaxed);
-    assert!(matches!(outcome, Err(ExperimentError::Controller(_))), "{outcome:?}");
-    drop((rig, peer));
-    assert_eq!(rig_server.session().ended, Ended::Farewell);
-    assert!(rig_server.drives().iter().any(|had| had.amplitude > 9e-5));
-    assert_eq!(rig_server.last().amplitude, 0.0);
 }

@@ -1,62 +1,33 @@
 //! Guards lock, decay and identification on the simulated plant: accuracy against exact orbits, regimes, advice where several or no orbits are
 //! stable, and experiments that end early.
 
-use vines::advice::{Reason, reason};
-use vines::comparison::Comparison;
-use vines::experiment::{self, ExperimentError};
-use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
-use vines::linear::LinearResponse;
-use vines::orbit::Orbit;
-use vines::plan::Plan;
-use vines::record::{Record, Sample};
-use vines::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, Fault, Rig, RigError, Sensors, SensorsOnly, Simulated,
-};
-use vines::scene::Scene;
+use vines_bench::advice::{Reason, reason};
+use vines_bench::comparison::Comparison;
+use vines_bench::experiment::{self, ExperimentError};
+use vines_bench::identification::{DecayEnd, IdentificationError, Regime, identify};
+use vines_bench::linear::LinearResponse;
+use vines_bench::plan::Plan;
+use vines_bench::record::Sample;
+use vines_bench::rig::{BuiltIn, Controller, Fault, Rig, SensorsOnly, Simulated};
+use vines_bench::scene::Scene;
+use vines_model::orbit::Orbit;
 
-use crate::{built_in, is_failure, rig, scene, text, vines};
+use super::{Foreign, dimensionless, paper, record_of};
 
-/// The record of an experiment; its error and its samples where it ends early.
-fn run(
-    rig: &mut dyn Rig,
-    controller: &mut dyn Controller,
-    scene: &Scene,
-) -> Result<Record, (ExperimentError, Vec<Sample>)> {
-    let mut samples = Vec::new();
-    let record = experiment::run_into(&mut samples, rig, controller, &scene.plan(), |_, _, _| {});
-    record.map_err(|error| (error, samples))
-}
-
-/// How an experiment on a rig ends early, with the built-in controller.
-fn ended(rig: &mut dyn Rig, scene: &Scene) -> (ExperimentError, Vec<Sample>) {
-    run(rig, &mut built_in(scene), scene).unwrap_err()
+/// How an experiment ends early, and its samples.
+fn ended(scene: &Scene) -> (ExperimentError, Vec<Sample>) {
+    let (mut rig, mut samples) = (Simulated::of(scene).unwrap(), Vec::new());
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let record = experiment::run_into(&mut samples, &mut *rig, &mut controller, &scene.plan(), |_, _, _| {});
+    (record.unwrap_err(), samples)
 }
 
 /// A controller that cannot control the response: it holds the drive.
-pub struct ConstantDrive(BuiltIn);
-
-impl ConstantDrive {
-    pub fn new(scene: &Scene) -> Self {
-        Self(built_in(scene))
-    }
-}
-
-impl Controller for ConstantDrive {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        self.0.sample(sensors, active)
-    }
+fn constant_drive(scene: &Scene) -> impl Controller {
+    Foreign::new(&scene.controller_config(), |_: &mut _, _| Ok(()))
 }
 
 /// What is identified on a rig.
-fn identified_on(
-    rig: &mut dyn Rig,
-    controller: &mut dyn Controller,
-    scene: &Scene,
-) -> Result<Comparison, IdentificationError> {
-    identified_by(rig, controller, scene, &scene.plan())
-}
-
-/// What is identified on a rig of which more may be known.
 fn identified_by(
     rig: &mut dyn Rig,
     controller: &mut dyn Controller,
@@ -68,11 +39,11 @@ fn identified_by(
 }
 
 fn identified_in(scene: &Scene) -> Comparison {
-    identified_on(&mut *rig(scene), &mut built_in(scene), scene).unwrap()
+    Comparison::of(&super::identified(scene).unwrap(), scene)
 }
 
 fn identified(settings: &str) -> Comparison {
-    identified_in(&scene(settings))
+    identified_in(&dimensionless(settings))
 }
 
 /// The exact orbit at the requested drive that a lock followed.
@@ -122,20 +93,18 @@ fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference_and_nearer_to_it_a
     let found = identified("phase_lock.lock.amplitude_drift=3.8e-9 phase_lock.lock.frequency_drift=4.5e-10");
     assert!(off(&found).iter().all(|off| *off < 1e-5));
     assert!(found.exact.unwrap().stable && found.lock.regime == Regime::Symmetric);
-    let found = identified_in(&Scene::load(None, &[]).unwrap());
+    let found = identified_in(&paper(&[]));
     assert!(off(&found)[0] < 1.2e-4 && found.lock.periods_to_lock <= 155.0);
-}
-
-/// What is identified on a rig that does not report its impacts.
-fn identified_without_ground_truth(scene: &Scene) -> Result<Comparison, IdentificationError> {
-    let mut rig = SensorsOnly::around(Box::new(Simulated::new(scene.plant, scene.start).unwrap()));
-    assert_eq!(rig.ground_truth().unwrap(), None);
-    identified_on(&mut rig, &mut built_in(scene), scene)
 }
 
 #[test]
 fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
-    let (mute, telling) = (identified_without_ground_truth(&scene("")).unwrap(), identified(""));
+    let scene = dimensionless("");
+    let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
+    assert_eq!(rig.ground_truth().unwrap(), None);
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let mute = identified_by(&mut rig, &mut controller, &scene, &scene.plan()).unwrap();
+    let telling = identified("");
     assert_eq!(mute.lock.regime, Regime::Symmetric);
     assert!(mute.lock.impacts_per_period.is_nan());
     assert_eq!(mute.lock.at.sigma, telling.lock.at.sigma);
@@ -148,18 +117,13 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
 #[test]
 fn a_lock_of_the_linear_mode_or_of_an_asymmetric_motion_is_refused() {
     // Under a constant drive nothing ever hits a particle at rest in the middle, and the loop locks all the same, at sigma = 0.
-    let rest = scene("start.dq2=0");
+    let rest = dimensionless("start.dq2=0");
     // Only the loop check knows the linear response of such a rig.
     let stated = rest.knowledge();
     let checked = stated.measured(LinearResponse::of(&rest.plant));
     for (knowledge, expected) in [(stated, Regime::NotEstablished), (checked, Regime::NoImpacts)] {
-        let mut rig = SensorsOnly::around(rig(&rest));
-        let found = identified_by(
-            &mut rig,
-            &mut ConstantDrive::new(&rest),
-            &rest,
-            &rest.plan_on(knowledge),
-        );
+        let mut rig = SensorsOnly::around(Simulated::of(&rest).unwrap());
+        let found = identified_by(&mut rig, &mut constant_drive(&rest), &rest, &rest.plan_on(knowledge));
         let refusal = found.unwrap_err();
         let is_expected = matches!(refusal, IdentificationError::Regime { regime, .. } if regime == expected);
         assert!(is_expected, "{refusal}");
@@ -167,9 +131,10 @@ fn a_lock_of_the_linear_mode_or_of_an_asymmetric_motion_is_refused() {
     // With the response held, the experiment would search for the symmetric motion.
     for (scene, expected, detunings) in [
         (rest, Regime::NoImpacts, -0.05..0.05),
-        (scene("excitation.G=1.7"), Regime::Asymmetric, -5.0..5.0),
+        (dimensionless("excitation.G=1.7"), Regime::Asymmetric, -5.0..5.0),
     ] {
-        let refusal = identified_on(&mut *rig(&scene), &mut ConstantDrive::new(&scene), &scene).unwrap_err();
+        let mut rig = Simulated::of(&scene).unwrap();
+        let refusal = identified_by(&mut *rig, &mut constant_drive(&scene), &scene, &scene.plan()).unwrap_err();
         let IdentificationError::Regime { regime, sigma, .. } = refusal else {
             panic!("{refusal}");
         };
@@ -190,8 +155,8 @@ fn the_slow_flow_predicts_the_measured_decay_better_than_the_backbone() {
 
 #[test]
 fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() {
-    let scene = scene("record.hold_periods=3 record.decay_periods=1");
-    let record = run(&mut *rig(&scene), &mut built_in(&scene), &scene).unwrap();
+    let scene = dimensionless("record.hold_periods=3 record.decay_periods=1");
+    let record = record_of(&scene);
     // The sample at which the lock had settled opens the hold.
     assert_eq!((record.hold().len(), record.decay().len()), (301, 100));
     let mut drives = record.decay().iter().map(|sample| sample.command.drive);
@@ -199,18 +164,11 @@ fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() 
     let found = Comparison::of(&identify(&record, &scene.plan()).unwrap(), &scene);
     assert!(found.decay.is_empty() && found.exact.is_some());
     assert_eq!(found.decay_end, DecayEnd::Record);
-    let folder = tempfile::tempdir().unwrap();
-    let short = "--set record.hold_periods=3 --set record.decay_periods=1";
-    let printed = vines(&format!(
-        "identify --rig built-in {short} --out {}",
-        folder.path().display()
-    ));
-    assert!(text(&printed).contains("Free decay: no points"), "{printed:?}");
 }
 
 #[test]
 fn the_exact_orbit_beside_a_held_base_is_that_of_the_base_as_it_moves() {
-    let found = identified_in(&scene(
+    let found = identified_in(&dimensionless(
         "chain.hold=true chain.reference=false controller.samples_per_period=64 record.hold_periods=240",
     ));
     let (at, exact) = (found.lock.at, followed(&found));
@@ -218,27 +176,6 @@ fn the_exact_orbit_beside_a_held_base_is_that_of_the_base_as_it_moves() {
     assert!(
         (exact.c - at.c).abs() < 1e-5 && (exact.sigma - at.sigma).abs() < 1e-4,
         "{at:?} {exact:?}"
-    );
-}
-
-#[test]
-fn a_particle_that_hits_before_the_signal_is_known_is_named_beside_the_fault() {
-    let settings = [
-        "start.dq2=3",
-        "resonance.sensor=q1",
-        "resonance.sensor_quantity=acceleration",
-    ];
-    let settings: String = settings.iter().map(|setting| format!("--set {setting} ")).collect();
-    let folder = tempfile::tempdir().unwrap();
-    let printed = vines(&format!(
-        "identify --rig built-in {settings} --out {}",
-        folder.path().display()
-    ));
-    is_failure(&printed, 1, "set start.dq2 = 0");
-    let message = String::from_utf8_lossy(&printed.stderr);
-    assert!(
-        message.contains("set start.dq2 = 0") && !message.contains("signal_timeout"),
-        "{message}"
     );
 }
 
@@ -265,7 +202,7 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named_and_so_are_gaps_b
     assert!((found.lock.at.c - followed.c).abs() < 2e-3, "{:?}", found.lock);
     // A motion that is neither of them is told about both.
     let regime = Regime::Asymmetric;
-    let refused = scene(settings);
+    let refused = dimensionless(settings);
     assert_eq!(
         reason(&refused, &refused.dimensionless(), Some(regime)),
         Some(Reason::Coexists { stable: stable.iter().map(|orbit| **orbit).collect(), regime })
@@ -273,7 +210,7 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named_and_so_are_gaps_b
     for orbit in stable {
         assert_eq!(found.others().any(|other| other == orbit), *orbit != followed);
     }
-    let gap = scene("plant.epsilon=0.02 plant.lambda=0.4 plant.r=0.8 excitation.G=0.7");
+    let gap = dimensionless("plant.epsilon=0.02 plant.lambda=0.4 plant.r=0.8 excitation.G=0.7");
     let Some(Reason::Unstable { g: 0.7, range: Some([low, high]) }) = reason(&gap, &gap.dimensionless(), None) else {
         panic!("an orbit is stable in the gap");
     };
@@ -287,34 +224,18 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named_and_so_are_gaps_b
     assert_eq!(file["exact"]["C"], exact.c);
 }
 
-/// A rig whose response is noise.
-struct Noise(fastrand::Rng);
-
-impl Rig for Noise {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        Ok(Sensors { response: self.0.f64() - 0.5, reference: None })
-    }
-
-    fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
-        Ok(())
-    }
-}
-
 #[test]
-fn noise_is_never_locked_and_a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
-    let (error, samples) = ended(&mut Noise(fastrand::Rng::with_seed(1)), &scene(""));
-    let is_silent = matches!(error, ExperimentError::Tripped { fault: Fault::NoSignal, .. });
-    assert!(is_silent && samples.len() < 2500, "{error} {}", samples.len());
+fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
     let coarse = "chain.adc_bits=2 phase_lock.signal_timeout='none' phase_lock.residual_max='none'";
-    let coarse = scene(&format!("{coarse} phase_lock.acquire_timeout=31.4"));
-    let message = ended(&mut *rig(&coarse), &coarse).0.to_string();
+    let coarse = dimensionless(&format!("{coarse} phase_lock.acquire_timeout=31.4"));
+    let message = ended(&coarse).0.to_string();
     assert!(message.contains("the phase cannot be measured"), "{message}");
 }
 
 #[test]
 fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_measured() {
-    let scene = scene("phase_lock.response_max=0.3");
-    let (error, samples) = ended(&mut *rig(&scene), &scene);
+    let scene = dimensionless("phase_lock.response_max=0.3");
+    let (error, samples) = ended(&scene);
     let ExperimentError::Tripped { periods, fault: Fault::ResponseTooLarge, .. } = error else {
         panic!("{error}");
     };
@@ -328,7 +249,7 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     let last = samples.last().unwrap();
     assert!(last.sensors.response.abs() > 0.3 && samples.len() > 100);
     assert_eq!(
-        vines::record::table(&samples, &scene.knowledge().target)
+        vines_bench::record::table(&samples, &scene.knowledge().target)
             .lines()
             .count(),
         samples.len() + 1

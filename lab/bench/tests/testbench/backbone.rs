@@ -1,30 +1,25 @@
 //! Guards the tracked backbone: accuracy against exact orbits, stated uncertainties, regimes with and without reported impacts, and failures.
 
-use vines::backbone::track;
-use vines::comparison::{TrackedComparison, TrackedPoint};
-use vines::experiment::ExperimentError;
-use vines::identification::Regime;
-use vines::loop_check::check;
-use vines::plan::Plan;
-use vines::rig::{BuiltIn, ControllerError, Rig, SensorsOnly, Simulated};
-use vines::scene::{Parameters, Scene};
+use vines_bench::backbone::track;
+use vines_bench::comparison::{TrackedComparison, TrackedPoint};
+use vines_bench::experiment::ExperimentError;
+use vines_bench::identification::Regime;
+use vines_bench::loop_check::check;
+use vines_bench::plan::Plan;
+use vines_bench::rig::{BuiltIn, ControllerError, Rig, SensorsOnly, Simulated};
+use vines_bench::scene::{Parameters, Scene};
 
-use crate::experiment::ConstantDrive;
-use crate::{rig, scene, words};
+use super::{Foreign, dimensionless};
 
-fn tracked_on(rig: &mut dyn Rig, scene: &Scene) -> Result<TrackedComparison, ExperimentError> {
-    tracked_by(rig, scene, &scene.plan())
-}
-
-fn tracked_by(rig: &mut dyn Rig, scene: &Scene, plan: &Plan) -> Result<TrackedComparison, ExperimentError> {
+fn compared(rig: &mut dyn Rig, scene: &Scene, plan: &Plan) -> Result<TrackedComparison, ExperimentError> {
     let mut controller = BuiltIn::new(&plan.tracking).unwrap();
     let tracked = track(rig, &mut controller, plan, |_, _| {})?;
     Ok(TrackedComparison::of(&tracked, scene))
 }
 
 fn tracked(settings: &str) -> TrackedComparison {
-    let scene = scene(settings);
-    let report = tracked_on(&mut *rig(&scene), &scene).unwrap();
+    let scene = dimensionless(settings);
+    let report = compared(&mut *Simulated::of(&scene).unwrap(), &scene, &scene.plan()).unwrap();
     println!(
         "{settings}: {:.1} periods per point, at most {:.1e} from the exact backbone at equal C",
         report.periods_per_point(),
@@ -116,7 +111,7 @@ fn tracked_from_sensors(
     checked: bool,
 ) -> Result<TrackedComparison, ExperimentError> {
     let few = "start.dq2=0 backbone.points=7 backbone.C_from=0.6 backbone.C_to=0.3";
-    let scene = scene(&format!("{few} {settings}"));
+    let scene = dimensionless(&format!("{few} {settings}"));
     let mut plan = scene.plan();
     let mut other = scene.clone();
     change(&mut other.plant);
@@ -125,7 +120,7 @@ fn tracked_from_sensors(
         let linear = check(&mut rig, &plan).unwrap().linear.expect("a linear response");
         plan = scene.plan_on(plan.knowledge.measured(linear.response));
     }
-    tracked_by(&mut rig, &scene, &plan)
+    compared(&mut rig, &scene, &plan)
 }
 
 #[test]
@@ -168,7 +163,7 @@ fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
 #[test]
 fn impacts_of_other_rigs_are_recognised_from_the_response_with_and_without_noise() {
     let rigs = "plant.r=0.65 plant.r=0.4 plant.r=0.85 plant.epsilon=0.003 plant.lambda=1";
-    for rig in words(rigs) {
+    for rig in rigs.split(' ') {
         for seed in 0..4 {
             let noise = format!("{rig} chain.snr=40 chain.seed={seed}");
             let (is_noisy, settings) = (seed > 0, if seed > 0 { &noise } else { rig });
@@ -184,14 +179,10 @@ fn impacts_of_other_rigs_are_recognised_from_the_response_with_and_without_noise
 
 #[test]
 fn a_controller_that_cannot_hold_the_response_is_refused() {
-    let scene = scene("");
-    let error = track(
-        &mut *rig(&scene),
-        &mut ConstantDrive::new(&scene),
-        &scene.plan(),
-        |_, _| {},
-    )
-    .unwrap_err();
+    let scene = dimensionless("");
+    let mut constant = Foreign::new(&scene.controller_config(), |_: &mut _, _| Ok(()));
+    let mut rig = Simulated::of(&scene).unwrap();
+    let error = track(&mut *rig, &mut constant, &scene.plan(), |_, _| {}).unwrap_err();
     let is_refused = matches!(error, ExperimentError::Controller(ControllerError::NoResponseLoop(_)));
     assert!(is_refused, "{error}");
 }
