@@ -214,11 +214,15 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             let Some((held, Regime::Symmetric | Regime::Unresolved)) = before else {
                 continue;
             };
+            let (response, b) = (self.plan.knowledge.target.units.response, self.plan.knowledge.numbers.b);
+            let (c, [held, level]) = (
+                [held / b, level / b],
+                [held, level].map(|metres| response.quantity(metres)),
+            );
             // Only where impacts are reported does a motion without them mean that they have ended.
             match (point.regime, point.regime_by_impacts) {
                 (regime @ (Regime::NoImpacts | Regime::Other), Some(_)) => {
-                    let b = self.plan.knowledge.numbers.b;
-                    return Err(ExperimentError::MotionLost { held, level, b, regime });
+                    return Err(ExperimentError::MotionLost { held, level, c, regime });
                 }
                 (Regime::Other, None) => return Err(ExperimentError::SteadyLost { held, level }),
                 _ => {}

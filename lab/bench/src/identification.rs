@@ -13,6 +13,7 @@ use thiserror::Error;
 use vines_model::numerics::{Estimate, SIGNIFICANT, mean, standard_deviation};
 
 use crate::record::{Record, Sample};
+use vines_rig::unit::Quantity;
 use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
 use vines_scene::scene::Measurand;
@@ -38,14 +39,18 @@ pub enum IdentificationError {
         regime: Regime,
         sigma: f64,
         c: f64,
-        /// Frequency, Hz, and response, m, of a rig that does not report impacts: nothing is then said of a particle.
-        silent: Option<[f64; 2]>,
+        /// Frequency, Hz, and response of a rig that does not report impacts: nothing is then said of a particle.
+        silent: Option<(f64, Quantity)>,
     },
     #[error(
-        "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion repeats only after {periods} periods of the drive. Try another \
-         drive or another [start]"
+        "the loop is locked at {f_hz:.5} Hz with a response of {response:.4e}, but the motion repeats only after {periods} periods of the drive. Try \
+         another drive or another [start]"
     )]
-    Repeats { periods: usize, f_hz: f64, a_m: f64 },
+    Repeats {
+        periods: usize,
+        f_hz: f64,
+        response: Quantity,
+    },
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the motion repeats only after {periods} periods of the drive: it is not 1:1. Try \
          another [start] (the particle must be moving) or another G"
@@ -71,10 +76,10 @@ pub enum IdentificationError {
 }
 
 /// That a lock is of another regime than the symmetric 1:1 one.
-fn regime_in_words(regime: Regime, [sigma, c]: [f64; 2], silent: Option<[f64; 2]>) -> String {
+fn regime_in_words(regime: Regime, [sigma, c]: [f64; 2], silent: Option<(f64, Quantity)>) -> String {
     match silent {
-        Some([f_hz, a_m]) => format!(
-            "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion is {}, and not steady and nonlinear. Try another drive \
+        Some((f_hz, response)) => format!(
+            "the loop is locked at {f_hz:.5} Hz with a response of {response:.4e}, but the motion is {}, and not steady and nonlinear. Try another drive \
              or another [start]",
             regime.motion()
         ),
@@ -106,7 +111,8 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     let knowledge = plan.knowledge;
     let lock = measure(record, plan).ok_or(IdentificationError::NoMotion)?;
     let ResonancePoint { f_hz, a_m, sigma, c, .. } = lock.at;
-    let silent = lock.regime_by_impacts.is_none().then_some([f_hz, a_m]);
+    let response = knowledge.target.units.response.quantity(a_m);
+    let silent = lock.regime_by_impacts.is_none().then_some((f_hz, response));
     let subharmonic = subharmonic(record.hold(), &knowledge, TAU * f_hz);
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so. So is one without symmetry where
     // there may be no cavity.
@@ -126,7 +132,7 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     }
     if let Some(periods) = subharmonic {
         return Err(match silent {
-            Some(_) => IdentificationError::Repeats { periods, f_hz, a_m },
+            Some(_) => IdentificationError::Repeats { periods, f_hz, response },
             None => IdentificationError::Subharmonic { periods, sigma, c },
         });
     }

@@ -9,6 +9,7 @@ mod measuring;
 mod scenes;
 mod shakers;
 mod structures;
+mod units;
 
 use vines_bench::backbone::{Tracked, track};
 use vines_bench::experiment::{ExperimentError, run};

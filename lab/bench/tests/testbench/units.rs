@@ -1,0 +1,241 @@
+//! Guards the units of messages and results: of a structure that a force drives and an accelerometer observes, all are in N, m/s² and m at the sensor.
+
+use std::cell::RefCell;
+use std::f64::consts::TAU;
+
+use num_complex::Complex;
+use phase_lock::Config;
+use vines_bench::backbone::track;
+use vines_bench::experiment::{self, ExperimentError};
+use vines_bench::identification::identify;
+use vines_bench::record::Record;
+use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Move, Sensors, SensorsOnly, Simulated};
+use vines_bench::scene::Scene;
+
+use super::Altered;
+
+/// The frame with an accelerometer. Its driven mode has 8.8156 Hz, a damping ratio of 0.006 and the shapes 0.45 at drive and sensor and 0.51252 at the
+/// cavity.
+fn frame(settings: &[&str]) -> Scene {
+    let file = format!("{}/../../scenes/frame.toml", env!("CARGO_MANIFEST_DIR"));
+    let settings = [
+        &["resonance.sensor_quantity=acceleration", "record.decay_periods=30"],
+        settings,
+    ]
+    .concat();
+    let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
+    Scene::load(Some(file.as_ref()), &settings).unwrap()
+}
+
+const OMEGA0: f64 = TAU * 8.8156;
+
+/// The force, N, for which a controller answers 1 m.
+fn per_metre() -> f64 {
+    OMEGA0 * OMEGA0 * 1.0_f64.hypot(2.0 * 0.006) / (0.45 * 0.51252)
+}
+
+/// What reached a rig, N, and what it read.
+#[derive(Default)]
+struct Log {
+    drives: Vec<f64>,
+    readings: Vec<Sensors>,
+}
+
+impl Log {
+    fn last(&self) -> Sensors {
+        *self.readings.last().unwrap()
+    }
+
+    /// Amplitude of the first harmonic of the response in the period of 100 samples before this one, as a displacement at about the natural frequency, m.
+    fn displacement(&self, end: usize) -> f64 {
+        let last = &self.readings[end - 100..end];
+        let turned = (0..)
+            .zip(last)
+            .map(|(n, sensors)| Complex::cis(TAU * f64::from(n) / 100.0) * sensors.response);
+        turned.sum::<Complex<f64>>().norm() / 50.0 / (OMEGA0 * OMEGA0)
+    }
+}
+
+/// The simulated rig of a scene, without what only a simulation knows if it is `silent`.
+fn logged<'a>(scene: &Scene, silent: bool, log: &'a RefCell<Log>) -> Altered<'a> {
+    let rig = Simulated::of(scene).unwrap();
+    Altered {
+        rig: if silent {
+            Box::new(SensorsOnly::around(rig))
+        } else {
+            rig
+        },
+        read: Box::new(|sensors| {
+            log.borrow_mut().readings.push(sensors);
+            Ok(sensors)
+        }),
+        drive: Box::new(|drive: Drive, step| {
+            log.borrow_mut().drives.push(drive.amplitude);
+            (drive, step)
+        }),
+    }
+}
+
+/// The built-in controller with another answer, by whether it is to drive and for how many samples it was not.
+struct Changed<F>(BuiltIn, usize, F);
+
+impl<F: FnMut(&mut Command, Option<usize>)> Controller for Changed<F> {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let mut command = self.0.sample(sensors, active)?;
+        command.state = None;
+        self.1 = if active { 0 } else { self.1 + 1 };
+        (self.2)(&mut command, (!active).then_some(self.1));
+        Ok(command)
+    }
+
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        self.0.hold_response(to, phase_target)
+    }
+
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        self.0.hold_drive()
+    }
+}
+
+fn run(scene: &Scene, change: impl FnMut(&mut Command, Option<usize>)) -> (Result<Record, ExperimentError>, Log) {
+    let log = RefCell::default();
+    let limits = Config { response_max: None, ..scene.controller_config() };
+    let mut controller = Changed(BuiltIn::new(&limits).unwrap(), 0, change);
+    let mut rig = logged(scene, false, &log);
+    let record = experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+    drop(rig);
+    (record, log.into_inner())
+}
+
+/// Numbers with a unit of a channel in a text, in this order.
+fn with_units(text: &str) -> Vec<(f64, &str)> {
+    let words: Vec<&str> = text.split([' ', '\n']).collect();
+    let pairs = words.windows(2).filter_map(|pair| {
+        let unit = pair[1].trim_end_matches([',', ';', ':', '.']);
+        let is_of_channel = ["m", "m/s", "m/s²", "N", "V", "N/m"].contains(&unit);
+        is_of_channel.then_some((pair[0].parse().ok()?, unit))
+    });
+    pairs.collect()
+}
+
+/// The text has these numbers with units, and no others; it states five digits.
+#[track_caller]
+fn assert_states(text: &str, expected: &[(f64, &str)]) {
+    let found = with_units(text);
+    let is_same = |((value, unit), (expected, of)): (&(f64, &str), &(f64, &str))| {
+        unit == of && (value / expected - 1.0).abs() < 6e-5
+    };
+    assert!(
+        found.len() == expected.len() && found.iter().zip(expected).all(is_same),
+        "{text}\n{found:?}\n{expected:?}"
+    );
+}
+
+/// What a run ends with, beside what reached the rig and what it read.
+fn ended<T>(scene: &Scene, silent: bool, run: impl FnOnce(&mut Altered, &Scene) -> Result<T, String>) -> (String, Log) {
+    let log = RefCell::default();
+    let error = run(&mut logged(scene, silent, &log), scene).err().unwrap();
+    (error, log.into_inner())
+}
+
+#[test]
+fn a_drive_by_force_that_is_refused_is_stated_in_newton_and_a_response_as_its_sensor_reads_it() {
+    let requested = frame(&[]).amplitude * per_metre();
+    let settings = &["phase_lock.amplitude_max=20"];
+    let (record, log) = run(&frame(settings), |command, _| command.drive.amplitude *= 1e3);
+    let expected = [(1e3 * requested, "N"), (20.0, "N"), (per_metre(), "N/m")];
+    assert_states(&record.unwrap_err().to_string(), &expected);
+    assert!(log.drives.is_empty());
+    let (record, _) = run(&frame(&[]), |command, _| command.drive.amplitude = -3e-6);
+    assert_states(&record.unwrap_err().to_string(), &[(-3e-6 * per_metre(), "N")]);
+    // The limit is a displacement at the sensor, in m.
+    let low = frame(&["phase_lock.response_max=0.002"]);
+    let limit = [(0.002, "m"), (0.002 * OMEGA0 * OMEGA0, "m/s²")];
+    let (record, log) = run(&low, |_, _| ());
+    let read = (log.last().response, "m/s²");
+    assert_states(&record.unwrap_err().to_string(), &[&[read][..], &limit].concat());
+    let (error, log) = ended(&low, false, |rig, scene| {
+        super::record(rig, scene).map_err(|error| error.to_string())
+    });
+    // The controller has ramped the drive down since.
+    let at = log
+        .readings
+        .iter()
+        .position(|sensors| sensors.response.abs() > limit[1].0)
+        .unwrap();
+    let Sensors { response, reference } = log.readings[at];
+    let expected = [(response, "m/s²"), (reference.unwrap(), "N"), (response.abs(), "m/s²")];
+    assert_states(&error, &[&expected[..], &limit].concat());
+}
+
+#[test]
+fn a_drive_by_force_that_is_not_released_is_stated_in_newton() {
+    let wrong = 1e-5;
+    let says = |change: fn(&mut Command, usize)| {
+        let (record, _) = run(&frame(&[]), |command, off| {
+            if let Some(samples) = off {
+                change(command, samples);
+            }
+        });
+        record.unwrap_err().to_string()
+    };
+    let amplitude = says(|command, _| command.drive.amplitude = 1e-5);
+    let present = says(|command, _| {
+        command.drive.amplitude = 0.0;
+        command.drive.displacement = 1e-5;
+    });
+    let again = says(|command, samples| command.drive.amplitude = if samples < 1000 { 0.0 } else { 1e-5 });
+    for (text, words) in [
+        (amplitude, "does not release the drive"),
+        (present, "F = 0, but a force of"),
+        (again, "drives again"),
+    ] {
+        assert!(text.contains(words), "{text}");
+        assert_states(&text, &[(wrong * per_metre(), "N")]);
+    }
+}
+
+#[test]
+fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
+    let b = 0.01 * 0.45 / 0.51252;
+    let is_near = |value: f64, expected: f64| (value / expected - 1.0).abs() < 0.02;
+    let by_search = |rig: &mut Altered, scene: &Scene| super::record(rig, scene).map_err(|error| error.to_string());
+    let [words, error] =
+        [false, true].map(|silent| ended(&frame(&["phase_lock.acquire_timeout=5"]), silent, by_search).0);
+    let [(tried, "m")] = with_units(&error)[..] else {
+        panic!("{error}")
+    };
+    assert!(
+        words.contains(&format!("C = 0.214 to {:.3} ", tried / b)),
+        "{error} {words}"
+    );
+    let (error, _) = ended(&frame(&["phase_lock.acquire_timeout=8"]), true, by_search);
+    let [(tried, "m"), (nearest, "m")] = with_units(&error)[..] else {
+        panic!("{error}")
+    };
+    assert!(nearest < tried && is_near(nearest, 0.8 * b), "{error}");
+    let (scene, log) = (
+        frame(&["controller.phase_target=-80", "start.dq2=0"]),
+        RefCell::default(),
+    );
+    let record = super::record(&mut logged(&scene, true, &log), &scene).unwrap();
+    let error = identify(&record, &scene.plan()).unwrap_err().to_string();
+    let [(locked, "m")] = with_units(&error)[..] else {
+        panic!("{error}")
+    };
+    assert!(is_near(locked, log.borrow().displacement(record.hold_end)), "{error}");
+    let settings = &[
+        "backbone.C_from=0.45",
+        "backbone.C_to=0.15",
+        "backbone.points=3",
+        "phase_lock.lock.unlock_tolerance=1.5",
+    ];
+    for silent in [false, true] {
+        let (error, _) = ended(&frame(settings), silent, |rig, scene| {
+            let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+            let tracked = track(rig, &mut controller, &super::checked(scene), |_, _| {});
+            tracked.unwrap().ended.map_or(Ok(()), |error| Err(error.to_string()))
+        });
+        assert_states(&error, &[(0.45 * b, "m"), (0.3 * b, "m")]);
+    }
+}
