@@ -315,7 +315,10 @@ fn checked(case: &Case, snr: &str) -> Result<MeasuredLinear, Failure> {
 }
 
 fn measured(tracked: &Tracked) -> Vec<MeasuredPoint> {
-    kept(tracked).map(|point| (&point.at).into()).collect()
+    let units = tracked.knowledge.target.units;
+    kept(tracked)
+        .map(|point| MeasuredPoint::of(&point.at, &units))
+        .collect()
 }
 
 /// Keeps what is read before each step, and changes the amplitude of the base by a factor that depends on the number of the sample.

@@ -21,6 +21,7 @@ use std::rc::Rc;
 
 use common::*;
 use lovines::StructureState;
+use vines_bench::fit::MeasuredPoint;
 use vines_bench::rig::{RigError, RigStage, Sensors, SimulatedStructure};
 use vines_bench::scene::{SceneShaker, Structure};
 use vines_bench::survey::contradiction;
@@ -259,7 +260,9 @@ fn run((scene, _): &(Scene, [f64; 4])) -> Run {
 
 /// Whether `vines backbone` says that the points do not belong to the scene, and to scenes with another r, b or m; `None` of a backbone that ended early.
 fn contradicted(scene: &Scene, tracked: &Tracked) -> [Option<bool>; 4] {
-    let points: Vec<_> = kept(tracked).map(|point| (&point.at).into()).collect();
+    let points: Vec<_> = kept(tracked)
+        .map(|point| MeasuredPoint::of(&point.at, &scene.units()))
+        .collect();
     let alter: [fn(&mut Parameters); 4] = [
         |_| (),
         |plant| plant.restitution -= 0.05,

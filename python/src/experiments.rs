@@ -8,7 +8,7 @@ use pyo3::{
     prelude::*,
     types::PyBytes,
 };
-use serde_json::json;
+use serde_json::{Value, json};
 use vines_bench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
@@ -87,7 +87,7 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     })
 }
 
-/// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty, and the phase target (degrees; NaN: the scene's);
+/// `points`: response (m), frequency (rad/s) and drive (m, or N of a force), each with its standard uncertainty, and the phase target (degrees; NaN: the scene's);
 /// `linear`: linear responses as JSON.
 #[pyfunction]
 pub fn fit(
@@ -98,6 +98,7 @@ pub fn fit(
     known: Vec<String>,
     linear: Vec<String>,
 ) -> PyResult<String> {
+    let units = scene.scene.units();
     let estimate = |value, uncertainty| Estimate { value, uncertainty };
     let point = |[response, u_response, omega, u_omega, drive, u_drive, phase]: [f64; 7]| {
         let phase = if phase.is_nan() {
@@ -106,12 +107,13 @@ pub fn fit(
             phase
         };
         phase_target("phase_target_deg", phase).map_err(invalid)?;
-        Ok::<_, PyErr>(MeasuredPoint {
+        let measured = MeasuredPoint {
             response: estimate(response, u_response),
             omega: estimate(omega, u_omega),
             drive: estimate(drive, u_drive),
             phase: phase.to_radians(),
-        })
+        };
+        Ok::<_, PyErr>(measured.in_metres(&units))
     };
     let known = known.iter().map(|one| one.parse::<Known>().map_err(invalid));
     let linear = linear
@@ -130,15 +132,6 @@ pub fn fit(
         find(&measured, &checked, |_| {})
     })?;
     let found = found.map_err(invalid)?;
-    let numbers = |point: MeasuredPoint| {
-        let MeasuredPoint { response, omega, drive, phase } = point;
-        let omega = omega.scaled(1.0 / std::f64::consts::TAU);
-        json!({
-            "f_Hz": omega.value, "A_m": response.value, "E_m": drive.value,
-            "u_f_Hz": omega.uncertainty, "u_A_m": response.uncertainty, "u_E_m": drive.uncertainty,
-            "phase_target_deg": scene.definition().at_phase(phase).phase_in_degrees(),
-        })
-    };
     let Found {
         fit,
         plant,
@@ -152,7 +145,7 @@ pub fn fit(
     } = found;
     let parts: Vec<_> = parts
         .iter()
-        .map(|part| json!({"part": part, "point": part.point.map(numbers)}))
+        .map(|part| json!({"part": part, "point": part.point.map(|point| numbers(point, scene))}))
         .collect();
     let names = |one: &Explanation| {
         one.possible()
@@ -175,6 +168,22 @@ pub fn fit(
             "m": plant.particle_mass, "b": plant.half_width, "r": plant.restitution,
         },
     }))
+}
+
+/// A point in hertz and the units of the channels.
+fn numbers(point: MeasuredPoint, scene: &Checked) -> Value {
+    let units = scene.units();
+    let MeasuredPoint { response, omega, drive, phase } = point.in_units(&units);
+    let omega = omega.scaled(1.0 / std::f64::consts::TAU);
+    let of_drive = match units.reference.symbol {
+        "N" => "F_N",
+        _ => "E_m",
+    };
+    json!({
+        "f_Hz": omega.value, "A_m": response.value, of_drive: drive.value,
+        "u_f_Hz": omega.uncertainty, "u_A_m": response.uncertainty, (format!("u_{of_drive}")): drive.uncertainty,
+        "phase_target_deg": scene.definition().at_phase(phase).phase_in_degrees(),
+    })
 }
 
 /// What a drive measures that is no motion.

@@ -63,7 +63,7 @@ pub struct LevelPoint {
 impl LevelPoint {
     /// Why the point has not settled, on a rig whose motions have mirror images or not; `None` if it has.
     pub fn unsettled(&self, is_symmetric: bool) -> Option<String> {
-        let ResonancePoint { e_m, u_e_m, .. } = self.at;
+        let Estimate { value: drive, uncertainty } = self.at.drive();
         Some(match self.regime {
             _ if self.settled => return None,
             _ if !self.reached => "the response does not reach the level".into(),
@@ -80,7 +80,7 @@ impl LevelPoint {
                 None => format!(
                     "{} periods give the drive to {:.2} % only",
                     self.averaged,
-                    100.0 * u_e_m / e_m
+                    100.0 * uncertainty / drive
                 ),
             },
         })

@@ -29,7 +29,7 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 use crate::identification::ResonancePoint;
 pub use vines_scene::scene::table::plain_table;
 pub use vines_scene::scene::table::{Channel, Contents};
-use vines_scene::scene::{Dimensionless, Parameters};
+use vines_scene::scene::{Dimensionless, Parameters, Unit, Units};
 
 pub use channels::Selection;
 pub use effects::{Candidate, Effect, EffectReport, Explanation, Found, Measurements, decimals, explain, find};
@@ -40,29 +40,53 @@ pub use recording::{Kind, LinearDecay, Part, Recording, RecordingError, parts};
 /// A measured point of the backbone: of phase resonance, or at another phase target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredPoint {
-    /// Amplitude of the fundamental of the response, m.
+    /// Amplitude of the fundamental of the response, metres of the oscillator.
     pub response: Estimate,
     /// Angular frequency, rad/s.
     pub omega: Estimate,
-    /// Amplitude of the base, m.
+    /// Amplitude of the base, metres of the oscillator.
     pub drive: Estimate,
     /// Phase of the response relative to the base at which it was measured, rad.
     pub phase: f64,
 }
 
-impl From<&ResonancePoint> for MeasuredPoint {
-    fn from(at: &ResonancePoint) -> Self {
+impl MeasuredPoint {
+    /// A point that was measured in these units.
+    pub fn of(at: &ResonancePoint, units: &Units) -> Self {
         let estimate = |value, uncertainty| Estimate { value, uncertainty };
-        Self {
+        let measured = Self {
             response: estimate(at.a_m, at.u_a_m),
             omega: estimate(TAU * at.f_hz, TAU * at.u_f_hz),
-            drive: estimate(at.e_m, at.u_e_m),
+            drive: at.drive(),
             phase: at.phase_target_deg.to_radians(),
+        };
+        measured.in_metres(units)
+    }
+
+    /// This point with response and drive, which are in these units, in metres of the oscillator.
+    #[must_use]
+    pub fn in_metres(self, units: &Units) -> Self {
+        self.each(units, Unit::in_metres)
+    }
+
+    /// This point with response and drive in these units.
+    #[must_use]
+    pub fn in_units(self, units: &Units) -> Self {
+        self.each(units, Unit::of_metres)
+    }
+
+    fn each(self, units: &Units, convert: fn(Unit, f64) -> f64) -> Self {
+        let converted = |unit, Estimate { value, uncertainty }| Estimate {
+            value: convert(unit, value),
+            uncertainty: convert(unit, uncertainty),
+        };
+        Self {
+            response: converted(units.response, self.response),
+            drive: converted(units.reference, self.drive),
+            ..self
         }
     }
-}
 
-impl MeasuredPoint {
     /// The point of phase resonance with this response, to first order: `E_R = E cos p` and `omega_R = omega + (omega/2) (E/A) sin p` for a phase of p
     /// beyond phase resonance.
     fn at_resonance(&self, definition: Definition) -> Self {

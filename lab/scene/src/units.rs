@@ -41,6 +41,16 @@ impl Unit {
     }
 }
 
+impl Unit {
+    /// A drive in this unit, as the motion of a base or as a force: in files they have different names.
+    pub fn base_or_force<T>(self, drive: T) -> [Option<T>; 2] {
+        match self.symbol {
+            "N" => [None, Some(drive)],
+            _ => [Some(drive), None],
+        }
+    }
+}
+
 /// The units of what a rig takes and of what its sensors read. Velocities and accelerations have those of the displacement, per s and s².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {

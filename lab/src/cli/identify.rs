@@ -3,6 +3,7 @@
 use clap::Args;
 use indicatif::ProgressBar;
 use vines::experiment::{Stage, run_into};
+use vines::fit::MeasuredPoint;
 use vines::identification::{IdentificationError, Regime, identify};
 use vines::{advice, comparison::Comparison, pack::File, report, survey::contradiction};
 
@@ -91,7 +92,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         );
     }
     // A rig that reports its impacts is a simulation of the scene.
-    let lock = vec![(&identification.lock.at).into()];
+    let lock = vec![MeasuredPoint::of(&identification.lock.at, &scene.units())];
     if !reports_impacts && let Some(found) = contradiction(&scene, lock) {
         text += &format!(
             "\n{}: track the backbone with `vines backbone`, and run `vines fit`\n",

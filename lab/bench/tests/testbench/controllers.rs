@@ -249,7 +249,7 @@ fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
                     assert!(!found.lock.at_requested_drive, "{turned} {times}");
                     format!(
                         "{:.3} times the requested",
-                        found.lock.at.e_m / found.lock.requested_e_m
+                        found.lock.at.drive().value / found.lock.requested()
                     )
                 }
             },
@@ -287,11 +287,12 @@ fn a_lock_at_the_requested_drive_and_phase_says_so_through_noise() {
         let scene = scene(&[snr]);
         let (record, _) = run(&scene, |config| config, |_, _| ());
         let found = identify(&record.unwrap(), &scene.plan()).unwrap();
-        let (at, requested) = (found.lock.at, found.lock.requested_e_m);
+        let (at, requested) = (found.lock.at, found.lock.requested());
         assert!(
             found.lock.at_requested_drive,
             "{snr}: {} ± {} m, {requested} m",
-            at.e_m, at.u_e_m
+            at.drive().value,
+            at.drive().uncertainty
         );
         assert!(TAU * at.f_hz > 0.0 && found.decay.end != DecayEnd::Driven);
     }

@@ -6,9 +6,10 @@ use std::rc::Rc;
 
 use lovines::{Drive, Plant, StructureState};
 use num_complex::Complex;
-use vines_bench::backbone::track;
+use vines_bench::backbone::{LevelPoint, track};
 use vines_bench::comparison::COMPARED_ABOVE;
 use vines_bench::experiment::{ExperimentError, run};
+use vines_bench::fit::MeasuredPoint;
 use vines_bench::identification::{DECAY_WINDOW, DecayEnd, DecayPoints, Regime, decay_points, identify};
 use vines_bench::loop_check::{Verdict, check};
 use vines_bench::plan::Plan;
@@ -93,8 +94,10 @@ fn a_lock_behind_a_shaker_states_its_force_in_newtons_and_its_command_in_volts()
     let lock = identified(&scene).unwrap().lock;
     let unit = scene.units().reference;
     let (force, u_force) = (lock.at.f_n.unwrap(), lock.at.u_f_n.unwrap());
-    assert!((unit.in_metres(force) / lock.at.e_m - 1.0).abs() < 1e-12);
-    assert!((unit.in_metres(u_force) / lock.at.u_e_m - 1.0).abs() < 1e-12);
+    let d = scene.dimensionless();
+    assert!((unit.in_metres(force) / d.amplitude(lock.at.g) - 1.0).abs() < 1e-12);
+    assert!((unit.in_metres(u_force) / d.amplitude(lock.at.u_g) - 1.0).abs() < 1e-12);
+    assert!(lock.at.e_m.is_none() && lock.at.u_e_m.is_none());
     // The exact orbits of structure and shaker state both.
     let orbits = Survey::of(&scene).unwrap().orbits;
     let apart = |orbit: &StructureOrbit| (orbit.omega / (TAU * lock.at.f_hz) - 1.0).abs();
@@ -180,7 +183,8 @@ fn tracked_points_behind_a_shaker_belong_to_their_scene_and_not_to_a_wrong_one()
         )
         .unwrap();
         let found = tracked(Simulated::of(&scene).unwrap().as_mut(), &scene).unwrap();
-        let points: Vec<_> = found.points.iter().map(|point| (&point.at).into()).collect();
+        let of = |point: &LevelPoint| MeasuredPoint::of(&point.at, &scene.units());
+        let points: Vec<_> = found.points.iter().map(of).collect();
         assert!(contradiction(&scene, points.clone()).is_none(), "preset {n}");
         let mut wrong = scene.clone();
         wrong.plant.restitution = 0.6;
@@ -217,7 +221,9 @@ fn all_levels_of_the_presets_with_a_shaker_settle() {
 fn distance_of_lock(scene: &Scene) -> f64 {
     let at = identified(scene).unwrap().lock.at;
     // The force is known to its uncertainty, which moves the orbit.
-    let [orbits, moved] = [at.e_m, at.e_m + at.u_e_m].map(|amplitude| {
+    let d = scene.dimensionless();
+    let [orbits, moved] = [at.g, at.g + at.u_g].map(|g| {
+        let amplitude = d.amplitude(g);
         let measured = Scene { amplitude, ..scene.clone() };
         phase_resonant(&measured, &measured.dimensionless())
     });

@@ -97,7 +97,7 @@ fn a_force_through_much_damping_is_checked_and_its_points_belong_to_the_scene() 
         let points: Vec<MeasuredPoint> = points
             .iter()
             .filter(|one| one.settled)
-            .map(|one| (&one.at).into())
+            .map(|one| MeasuredPoint::of(&one.at, &scene.units()))
             .collect();
         assert!(points.len() > 20, "{}", points.len());
         assert!(contradiction(&points, scene.definition(), &scene.plant).is_none());
@@ -496,7 +496,7 @@ fn points_of_a_structure_without_its_other_modes_are_those_of_the_driven_mode() 
 }
 
 /// A preset of `scenes/`.
-fn preset(name: &str, settings: &[&str]) -> Scene {
+pub(super) fn preset(name: &str, settings: &[&str]) -> Scene {
     let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
     Scene::load(Some(file.as_ref()), &settings).unwrap()

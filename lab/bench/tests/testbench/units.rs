@@ -6,25 +6,23 @@ use std::f64::consts::TAU;
 use num_complex::Complex;
 use phase_lock::Config;
 use vines_bench::backbone::track;
+use vines_bench::comparison::Comparison;
 use vines_bench::experiment::{self, ExperimentError};
+use vines_bench::fit::MeasuredPoint;
 use vines_bench::identification::identify;
-use vines_bench::record::Record;
+use vines_bench::loop_check::check;
+use vines_bench::record::{Record, table};
 use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Move, Sensors, SensorsOnly, Simulated};
 use vines_bench::scene::Scene;
 
-use super::Altered;
+use super::structures::preset;
+use super::{Altered, identified};
 
 /// The frame with an accelerometer. Its driven mode has 8.8156 Hz, a damping ratio of 0.006 and the shapes 0.45 at drive and sensor and 0.51252 at the
 /// cavity.
 fn frame(settings: &[&str]) -> Scene {
-    let file = format!("{}/../../scenes/frame.toml", env!("CARGO_MANIFEST_DIR"));
-    let settings = [
-        &["resonance.sensor_quantity=acceleration", "record.decay_periods=30"],
-        settings,
-    ]
-    .concat();
-    let settings: Vec<_> = settings.iter().map(|one| one.parse().unwrap()).collect();
-    Scene::load(Some(file.as_ref()), &settings).unwrap()
+    let accelerometer = ["resonance.sensor_quantity=acceleration", "record.decay_periods=30"];
+    preset("frame", &[&accelerometer, settings].concat())
 }
 
 const OMEGA0: f64 = TAU * 8.8156;
@@ -46,13 +44,13 @@ impl Log {
         *self.readings.last().unwrap()
     }
 
-    /// Amplitude of the first harmonic of the response in the period of 100 samples before this one, as a displacement at about the natural frequency, m.
-    fn displacement(&self, end: usize) -> f64 {
-        let last = &self.readings[end - 100..end];
-        let turned = (0..)
-            .zip(last)
-            .map(|(n, sensors)| Complex::cis(TAU * f64::from(n) / 100.0) * sensors.response);
-        turned.sum::<Complex<f64>>().norm() / 50.0 / (OMEGA0 * OMEGA0)
+    /// Amplitude of the first harmonic of the response in the period before this sample, as a displacement, m; a second has 881.56 samples.
+    fn displacement(&self, end: usize, hertz: f64) -> f64 {
+        let (omega, step) = (TAU * hertz, 1.0 / 881.56);
+        let period = (1.0 / (hertz * step)).round() as usize;
+        let readings = (0..).zip(&self.readings[end - period..end]);
+        let turned = readings.map(|(n, sensors)| Complex::cis(omega * step * f64::from(n)) * sensors.response);
+        2.0 * turned.sum::<Complex<f64>>().norm() / (period as f64 * omega * omega)
     }
 }
 
@@ -223,7 +221,10 @@ fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
     let [(locked, "m")] = with_units(&error)[..] else {
         panic!("{error}")
     };
-    assert!(is_near(locked, log.borrow().displacement(record.hold_end)), "{error}");
+    assert!(
+        is_near(locked, log.borrow().displacement(record.hold_end, 8.81331)),
+        "{error}"
+    );
     let settings = &[
         "backbone.C_from=0.45",
         "backbone.C_to=0.15",
@@ -237,5 +238,50 @@ fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
             tracked.unwrap().ended.map_or(Ok(()), |error| Err(error.to_string()))
         });
         assert_states(&error, &[(0.45 * b, "m"), (0.3 * b, "m")]);
+    }
+}
+
+#[test]
+fn results_of_a_force_test_are_in_newton_and_metres_at_the_sensor_and_are_read_again() {
+    let (scene, log) = (frame(&[]), RefCell::default());
+    let checked = check(&mut logged(&scene.clone().at_rest(), true, &log), &scene.plan()).unwrap();
+    let strongest = log.borrow().drives.iter().copied().fold(0.0, f64::max);
+    assert!((checked.amplitude / strongest - 1.0).abs() < 1e-12);
+    let log = RefCell::default();
+    let record = super::record(&mut logged(&scene, false, &log), &scene).unwrap();
+    let found = identify(&record, &scene.plan()).unwrap();
+    let (lock, hold_end, log) = (found.lock, record.hold_end, log.into_inner());
+    let near = |value: f64, expected: f64, by: f64| assert!((value / expected - 1.0).abs() < by, "{value} {expected}");
+    near(lock.at.f_n.unwrap(), log.drives[hold_end - 1], 2e-3);
+    near(lock.requested(), frame(&[]).amplitude * per_metre(), 1e-12);
+    near(lock.at.a_m, log.displacement(hold_end, lock.at.f_hz), 0.02);
+    // The half-width as a response at the sensor.
+    let b = 0.01 * 0.45 / 0.51252;
+    near(lock.at.a_m / lock.at.c, b, 1e-12);
+    let point = MeasuredPoint::of(&lock.at, &scene.units());
+    near(point.drive.value, scene.dimensionless().amplitude(lock.at.g), 1e-12);
+    near(point.response.value, 0.01 * lock.at.c, 1e-12);
+    let json = serde_json::to_value(Comparison::of(&found, &scene)).unwrap();
+    let keys: Vec<&str> = json["lock"].as_object().unwrap().keys().map(String::as_str).collect();
+    let in_metres: Vec<_> = keys.iter().filter(|key| key.ends_with("_m")).collect();
+    assert_eq!(in_metres, [&"A_m", &"u_A_m"], "{keys:?}");
+    assert!(
+        ["F_N", "u_F_N", "F_requested_N"].iter().all(|key| keys.contains(key)),
+        "{keys:?}"
+    );
+    assert!(
+        table(&record.samples, &scene.knowledge().target)
+            .starts_with("time,response [m/s²],reference [N],omega,E [N],")
+    );
+}
+
+#[test]
+fn points_of_a_decay_are_displacements_at_the_sensor() {
+    let scene = preset("cantilever", &["structure.sensor=middle", "record.decay_periods=30"]);
+    let points = identified(&scene).unwrap().decay.points;
+    assert!(!points.is_empty());
+    for point in points {
+        let b = 0.01 * 0.17399 / 0.51252;
+        assert!((point.a_m / (point.c * b) - 1.0).abs() < 1e-12 && (point.u_a_m / (point.u_c * b) - 1.0).abs() < 1e-12);
     }
 }
