@@ -12,7 +12,9 @@ use vines_bench::fit::MeasuredPoint;
 use vines_bench::identification::identify;
 use vines_bench::loop_check::check;
 use vines_bench::record::{Record, table};
-use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Move, Sensors, SensorsOnly, Simulated};
+use vines_bench::rig::{
+    BuiltIn, Command, Controller, ControllerError, Drive, Move, RigFault, Sensors, SensorsOnly, Simulated, faulty,
+};
 use vines_bench::scene::Scene;
 
 use super::structures::preset;
@@ -284,4 +286,52 @@ fn points_of_a_decay_are_displacements_at_the_sensor() {
         let b = 0.01 * 0.17399 / 0.51252;
         assert!((point.a_m / (point.c * b) - 1.0).abs() < 1e-12 && (point.u_a_m / (point.u_c * b) - 1.0).abs() < 1e-12);
     }
+}
+
+/// The shaker on the cantilever, with a sensor of velocity in its middle.
+#[test]
+fn behind_a_shaker_a_motion_that_is_not_steady_is_stated_at_the_sensor_and_a_force_that_contradicts_in_newton() {
+    let text = include_str!("../../../../scenes/shaker-cantilever.toml")
+        .replace(
+            "tip = 0.51252, root = 0.04672",
+            "tip = 0.51252, middle = 0.17399, root = 0.04672",
+        )
+        .replace(
+            "tip = -0.51252, root = 0.20366",
+            "tip = -0.51252, middle = 0.36568, root = 0.20366",
+        )
+        .replace(
+            "tip = 0.51252, root = 0.36168",
+            "tip = 0.51252, middle = 0.01008, root = 0.36168",
+        )
+        .replace("sensor = \"tip\"", "sensor = \"middle\"");
+    let velocity = "resonance.sensor_quantity=velocity".parse().unwrap();
+    let scene = Scene::parse("middle", &text, &[velocity]).unwrap();
+    let (log, mut n) = (RefCell::default(), 0.0);
+    let mut rig = logged(&scene, false, &log);
+    rig.read = Box::new(|sensors| {
+        // The sensor changes its sensitivity by 3 % in a beat of 41 periods of 100 samples, which the loop follows.
+        n += 1.0;
+        let response = sensors.response * (1.0 + 0.03 * f64::sin(TAU * n / 4100.0));
+        log.borrow_mut().readings.push(Sensors { response, ..sensors });
+        Ok(Sensors { response, ..sensors })
+    });
+    let error = super::record(&mut rig, &scene).err().unwrap().to_string();
+    drop(rig);
+    assert!(error.contains("is not steady"), "{error}");
+    let [(held, "m")] = with_units(&error)[..] else {
+        panic!("{error}")
+    };
+    let log = log.into_inner();
+    let expected = OMEGA0 * log.displacement(log.readings.len(), 8.7);
+    assert!((held / expected - 1.0).abs() < 0.05, "{error} {expected}");
+    let [_, amplifier, _] = RigFault::OF_SHAKER.map(|(_, fault)| fault);
+    let mut rig = faulty(&scene, amplifier, 20.0, |_| {}).unwrap();
+    let error = super::record(&mut rig, &scene).err().unwrap().to_string();
+    assert!(error.contains("the force contradicts command and response"), "{error}");
+    let [(expected, "N"), (read, "N")] = with_units(&error)[..] else {
+        panic!("{error}")
+    };
+    // The amplifier clips at half of the command.
+    assert!((0.4..0.7).contains(&(read / expected)), "{error}");
 }
