@@ -61,7 +61,11 @@ fn measure([rig, client]: &[Scene; 2]) -> Result<Found, Failure> {
         let unit = epsilon * linear.omega0;
         let sigma = (own.omega(point.at.sigma) - truth.omega).abs() / unit;
         let u_sigma = own.omega_change(point.at.u_sigma) / unit;
-        let ratios = [sigma / u_sigma, (point.at.e_m - truth.amplitude).abs() / point.at.u_e_m];
+        let drive = point.at.drive();
+        let ratios = [
+            sigma / u_sigma,
+            (drive.value - truth.amplitude).abs() / drive.uncertainty,
+        ];
         if ratios.iter().any(|ratio| *ratio > 3.0) {
             found.counts[5] += 1;
             println!("{ratios:.1?} u: {:?} {linear:?} {point:?}", rig.plant);

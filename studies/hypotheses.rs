@@ -17,7 +17,6 @@ use lovines::{Cavity, Restitution};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use vines_bench::fit::{Found, Hypothesis, MeasuredPoint, Measurements, Quantity, find};
 use vines_bench::scene::{Parameters, Scene};
@@ -72,8 +71,16 @@ fn drawn(uniform: Uniform, hypothesis: Hypothesis) -> Rig {
     Rig {
         truth: plant(values, cavity),
         scene: plant(about, Cavity::IDEAL),
-        cubic: if hypothesis == Hypothesis::Cubic { share * epsilon } else { 0.0 },
-        gain: if hypothesis == Hypothesis::Reference { uniform(-0.02, 0.02) } else { 0.0 },
+        cubic: if hypothesis == Hypothesis::Cubic {
+            share * epsilon
+        } else {
+            0.0
+        },
+        gain: if hypothesis == Hypothesis::Reference {
+            uniform(-0.02, 0.02)
+        } else {
+            0.0
+        },
         hypothesis,
     }
 }
@@ -83,7 +90,10 @@ fn points(rig: &Rig, snr: f64, seed: u64) -> Option<Vec<MeasuredPoint>> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut measured = |value: f64, relative: f64| {
         let normal: f64 = StandardNormal.sample(&mut random);
-        Estimate { value: value * (1.0 + relative * normal), uncertainty: value * relative }
+        Estimate {
+            value: value * (1.0 + relative * normal),
+            uncertainty: value * relative,
+        }
     };
     let u = 0.1 * 10_f64.powf(-snr / 20.0);
     let manifold = Manifold::new(rig.truth.restitution);
@@ -116,7 +126,9 @@ fn judged(rig: &Rig, found: &Found) -> Judged {
     let fits = &found.hypotheses.fits;
     let of = |hypothesis: Hypothesis| fits.iter().find(|fit| fit.hypothesis == hypothesis);
     let is_possible = |hypothesis| of(hypothesis).is_some_and(|fit| fit.excluded.is_none());
-    let range = quantities.clone().filter_map(|one| Some(off(found.hypotheses.range(*one)?, *one)));
+    let range = quantities
+        .clone()
+        .filter_map(|one| Some(off(found.hypotheses.range(*one)?, *one)));
     let row = quantities.filter_map(|one| Some(off(of(rig.hypothesis)?.estimate(*one)?, *one)));
     Judged {
         range: range.collect(),
@@ -130,37 +142,54 @@ fn judged(rig: &Rig, found: &Found) -> Judged {
 }
 
 fn main() -> Result<(), Failure> {
-    let [rigs, seed] = [1, 2].map(|n| std::env::args().nth(n).and_then(|text| text.parse().ok()));
-    let (rigs, seed): (usize, u64) = (rigs.unwrap_or(25) as usize, seed.unwrap_or(1));
-    let mut lines = vec!["hypothesis,snr_dB,known,rigs,rejected,covered,worst,row,possible,named,seed".to_string()];
+    let [rigs, seed] = [1, 2].map(|n| std::env::args().nth(n).and_then(|text| text.parse::<f64>().ok()));
+    let (rigs, seed): (usize, u64) = (rigs.unwrap_or(25.0) as usize, seed.unwrap_or(1.0) as u64);
+    let default = Scene::load(None, &[])?;
+    let mut lines = Vec::new();
     for (number, hypothesis) in Hypothesis::ALL.into_iter().take(7).enumerate() {
         for (snr, is_known) in [(60.0, false), (60.0, true), (40.0, false), (40.0, true)] {
             let one = |n: usize| {
                 let own = seed * 1_000_000 + (number * 10_000 + n) as u64;
-                let mut random = ChaCha8Rng::seed_from_u64(own);
-                let rig = drawn(&mut |low, high| uniform(&mut random, low, high), hypothesis);
+                let rig = drawn(&mut uniform(own), hypothesis);
                 let points = points(&rig, snr, own)?;
                 let exact = |quantity: Quantity| {
                     let value = quantity.of_plant(&rig.truth);
-                    format!("{}={value}±{}", quantity.symbol()[0], 0.003 * value).parse().ok()
+                    format!("{}={value}±{}", quantity.symbol()[0], 0.003 * value)
+                        .parse()
+                        .ok()
                 };
-                let known = [Quantity::B, Quantity::Epsilon].into_iter().filter(|_| is_known).filter_map(exact);
+                let known = [Quantity::B, Quantity::Epsilon]
+                    .into_iter()
+                    .filter(|_| is_known)
+                    .filter_map(exact);
                 let measured = Measurements { points, known: known.collect(), ..Measurements::default() };
-                let scene = Scene { plant: rig.scene, ..Scene::default() };
+                let scene = Scene { plant: rig.scene, ..default.clone() };
                 Some(judged(&rig, &find(&measured, &scene, |_| {}).ok()?))
             };
             let all: Vec<Judged> = (0..rigs).into_par_iter().filter_map(one).collect();
             let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
             let kept: Vec<&Judged> = all.iter().filter(|one| one.possible[0]).collect();
             let within = |of: &[f64]| of.iter().filter(|off| **off <= 1.96).count();
-            let covered = share(kept.iter().map(|one| within(&one.range)).sum(), kept.iter().map(|one| one.range.len()).sum());
-            let row = share(all.iter().map(|one| within(&one.row)).sum(), all.iter().map(|one| one.row.len()).sum());
-            let worst = kept.iter().flat_map(|one| &one.range).fold(0.0, |worst: f64, one| worst.max(*one));
+            let covered = share(
+                kept.iter().map(|one| within(&one.range)).sum(),
+                kept.iter().map(|one| one.range.len()).sum(),
+            );
+            let row = share(
+                all.iter().map(|one| within(&one.row)).sum(),
+                all.iter().map(|one| one.row.len()).sum(),
+            );
+            let worst = kept
+                .iter()
+                .flat_map(|one| &one.range)
+                .fold(0.0, |worst: f64, one| worst.max(*one));
             let possible = share(all.iter().filter(|one| one.possible[1]).count(), all.len());
-            let named = share(all.iter().filter(|one| one.possible[1] && !one.possible[2]).count(), all.len());
+            let named = share(
+                all.iter().filter(|one| one.possible[1] && !one.possible[2]).count(),
+                all.len(),
+            );
             let known = if is_known { "b epsilon" } else { "nothing" };
             let line = format!(
-                "{},{snr},{known},{},{:.3},{covered:.3},{worst:.2},{row:.3},{possible:.3},{named:.3},{seed}",
+                "{},{snr},{known},{seed},{},{:.3},{covered:.3},{worst:.2},{row:.3},{possible:.3},{named:.3}",
                 hypothesis.names()[0],
                 all.len(),
                 share(all.len() - kept.len(), all.len()),
@@ -169,5 +198,6 @@ fn main() -> Result<(), Failure> {
             lines.push(line);
         }
     }
-    write("hypotheses.csv", &lines)
+    let header = "hypothesis,snr_dB,known,seed,rigs,rejected,covered,worst,row,possible,named";
+    write("hypotheses", header, 4, &lines)
 }

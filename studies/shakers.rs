@@ -259,7 +259,7 @@ fn run((scene, _): &(Scene, [f64; 4])) -> Run {
 
 /// Whether `vines backbone` says that the points do not belong to the scene, and to scenes with another r, b or m; `None` of a backbone that ended early.
 fn contradicted(scene: &Scene, tracked: &Tracked) -> [Option<bool>; 4] {
-    let points: Vec<_> = kept(tracked).map(|point| (&point.at).into()).collect();
+    let points: Vec<_> = kept(tracked).map(|point| point.at.measured(&scene.units())).collect();
     let alter: [fn(&mut Parameters); 4] = [
         |_| (),
         |plant| plant.restitution -= 0.05,

@@ -48,7 +48,8 @@ export class Strip {
     $("lamp").dataset.kind = kind;
     set("hertz", `${(point.omega / (2 * Math.PI)).toFixed(3)} Hz`);
     set("sigma", `σ = ${point.sigma.toFixed(3)}`.replace("-", "−"));
-    set("millimetres", `${(point.C * page.values.gap).toFixed(2)} mm`);
+    // Of a structure at its sensor.
+    set("millimetres", `${(point.C * (page.bench.host?.gap ?? page.values.gap)).toFixed(2)} mm`);
     set("amplitude", `C = ${point.C.toFixed(3)}`);
     const [sentence, action, label] = advice(page, status, point, regime, replay);
     set("advice", sentence);

@@ -85,7 +85,7 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     })
 }
 
-/// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty, and the phase target (degrees; NaN: the scene's);
+/// `points`: response (m), frequency (rad/s) and drive (m, or N of a force), each with its standard uncertainty, and the phase target (degrees; NaN: the scene's);
 /// `linear`: linear responses as JSON; `calibration`: standard uncertainty of the gain of the reference, relative.
 #[pyfunction]
 pub fn fit(
@@ -109,6 +109,7 @@ pub fn fit(
             "a recording is fitted for one oscillator, and the structure has {modes} modes: give the points of a backbone"
         )));
     }
+    let units = scene.scene.units();
     let estimate = |value, uncertainty| Estimate { value, uncertainty };
     let point = |[response, u_response, omega, u_omega, drive, u_drive, phase]: [f64; 7]| {
         let phase = if phase.is_nan() {
@@ -117,12 +118,13 @@ pub fn fit(
             phase
         };
         phase_target("phase_target_deg", phase).map_err(invalid)?;
-        Ok::<_, PyErr>(MeasuredPoint {
+        let measured = MeasuredPoint {
             response: estimate(response, u_response),
             omega: estimate(omega, u_omega),
             drive: estimate(drive, u_drive),
             phase: phase.to_radians(),
-        })
+        };
+        Ok::<_, PyErr>(measured.in_metres(&units))
     };
     let known = known.iter().map(|one| one.parse::<Known>().map_err(invalid));
     let linear = linear

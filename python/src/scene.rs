@@ -68,4 +68,9 @@ impl Scene {
     fn dimensionless(&self) -> PyResult<String> {
         json(&self.scene.dimensionless())
     }
+
+    /// The unit in which the drive of the scene is measured: m of a base, N of a force.
+    fn drive_unit(&self) -> &'static str {
+        self.scene.units().reference.symbol
+    }
 }

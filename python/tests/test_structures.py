@@ -246,3 +246,17 @@ def test_after_the_stinger_is_cut_the_channels_are_those_of_the_structure_alone(
     expected = 2 * driven["tip"][-1] - driven["tip"][-2]
     assert free["tip"][1] == pytest.approx(expected, abs=0.01 * np.abs(driven["tip"]).max())
     assert np.abs(free["current"][-1]) < np.abs(driven["current"]).max()
+
+
+def test_points_of_a_force_test_have_newtons_and_are_fitted_with_their_scene() -> None:
+    scene = vines.Scene(
+        SCENES / "frame.toml", resonance={"sensor_quantity": "acceleration"}, backbone={"points": 6, "C_to": 0.4}
+    )
+    points = vines.backbone(scene).points
+    assert [name for name in points if name.endswith(("_m", "_N"))] == ["A_m", "F_N", "u_A_m", "u_F_N"]
+    found = vines.fit(points, scene)
+    value, uncertainty = found["b"]
+    assert found.describes
+    assert abs(value - 0.01) < uncertainty
+    with pytest.raises(ValueError, match="no column E_m, u_E_m"):
+        vines.fit(points)

@@ -51,9 +51,9 @@ class Identification(Result):
     Attributes
     ----------
     lock : dict
-        The locked point: f_Hz, A_m, E_m, G, sigma, C, B, phase_target_deg, phase_error_deg, their standard
-        uncertainties u_*, motion, regime_by_impacts and others; of a force test also F_N and u_F_N, and behind a shaker
-        its command, command_V.
+        The locked point: f_Hz, A_m (at the sensor), E_m, G, sigma, C, B, phase_target_deg, phase_error_deg, their
+        standard uncertainties u_*, motion, regime_by_impacts and others; of a force test F_N and u_F_N instead of E_m
+        and u_E_m, and behind a shaker its command, command_V.
     exact : Orbit or None
         The exact phase-resonant orbit with the measured C, if there is one.
     decay : dict of ndarray
@@ -127,8 +127,9 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     found = json.loads(_native.identify(checked(scene)._native, results == "all"))
     lock = found["lock"]
     if not lock["at_requested_drive"]:
-        asked = lock["E_requested_m"]
-        message = f"the lock is at another drive: E = {lock['E_m']:.5e} m, and {asked:.5e} m was asked for"
+        name, unit = ("F", "N") if "F_N" in lock else ("E", "m")
+        drive, asked = lock[f"{name}_{unit}"], lock[f"{name}_requested_{unit}"]
+        message = f"the lock is at another drive: {name} = {drive:.5e} {unit}, and {asked:.5e} {unit} was asked for"
         warnings.warn(message, stacklevel=2)
     return Identification(
         theory=theory(scene),
@@ -147,7 +148,7 @@ class Backbone(Result):
     ----------
     points : dict of ndarray
         f_Hz, A_m, E_m, C, sigma, G, their standard uncertainties u_*, phase_target_deg, level, periods, settled,
-        reached, motion, regime_by_impacts and others; of a force test also F_N and u_F_N, and behind a shaker its
+        reached, motion, regime_by_impacts and others; of a force test F_N instead of E_m, and behind a shaker its
         command, command_V.
     periods : float
         All periods, from the start to the last point.

@@ -16,7 +16,6 @@ from .recordings import LinearDecay, Recording, linear_decay
 from .results import Result, axes
 from .scenes import Scene, checked
 
-_COLUMNS = ("A_m", "u_A_m", "f_Hz", "u_f_Hz", "E_m", "u_E_m")
 _LINEAR = ("f0_Hz", "u_f0_Hz", "zeta", "u_zeta", "correlation", "particle")
 _MOTIONS = {
     "motion": ("nonlinear, symmetric", "nonlinear, symmetry unresolved"),
@@ -109,10 +108,11 @@ def fit(
     Parameters
     ----------
     points : mapping or iterable of mappings
-        Columns f_Hz, A_m, E_m and their standard uncertainties u_f_Hz, u_A_m, u_E_m: `backbone().points`, a DataFrame
-        of pandas, or several locks such as `identify().lock`. Points that are not settled, or whose motion is not
-        nonlinear and symmetric, are left out. The column phase_target_deg (degrees) says at which phase of the response
-        relative to the base they were measured; without it, it is the scene's controller.phase_target.
+        Columns f_Hz, A_m (at the sensor), E_m or, of a force, F_N, and their standard uncertainties u_f_Hz, u_A_m,
+        u_E_m or u_F_N: `backbone().points`, a DataFrame of pandas, or several locks such as `identify().lock`. Points
+        that are not settled, or whose motion is not nonlinear and symmetric, are left out. The column phase_target_deg
+        (degrees) says at which phase of the response relative to the base they were measured; without it, it is the
+        scene's controller.phase_target.
     scene : Scene, optional
         Where the search begins; default: the default scene.
     known : mapping, optional
@@ -143,14 +143,16 @@ def fit(
     (True, 'ideal cavity', 0.65, 0.0084)
     """
     tables: list[Any] = [points] if isinstance(points, Mapping) or hasattr(points, "columns") else list(points)
+    given = checked(scene)._native
+    drive = "F_N" if given.drive_unit() == "N" else "E_m"
+    names = ("A_m", "u_A_m", "f_Hz", "u_f_Hz", drive, f"u_{drive}")
     rows: list[list[float]] = []
     responses = list(linear)
     for table in tables:
-        missing = [name for name in _COLUMNS if name not in table]
+        missing = [name for name in names if name not in table]
         if missing:
-            raise ValueError(f"the points have no column {', '.join(missing)}; a fit needs {', '.join(_COLUMNS)}")
-        units = {name: "Hz" if name.endswith("_Hz") else "m" for name in _COLUMNS}
-        columns = [np.atleast_1d(reals(name, table[name], units[name], missing=True)) for name in _COLUMNS]
+            raise ValueError(f"the points have no column {', '.join(missing)}; a fit needs {', '.join(names)}")
+        columns = [np.atleast_1d(reals(name, table[name], name.rsplit("_", 1)[1], missing=True)) for name in names]
         kept = np.ones(columns[0].shape, dtype=bool)
         for name in ("settled", "reached"):
             if name in table:

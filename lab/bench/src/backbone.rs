@@ -63,7 +63,7 @@ pub struct LevelPoint {
 impl LevelPoint {
     /// Why the point has not settled, on a rig whose motions have mirror images or not; `None` if it has.
     pub fn unsettled(&self, is_symmetric: bool) -> Option<String> {
-        let ResonancePoint { e_m, u_e_m, .. } = self.at;
+        let Estimate { value: drive, uncertainty } = self.at.drive();
         Some(match self.regime {
             _ if self.settled => return None,
             _ if !self.reached => "the response does not reach the level".into(),
@@ -80,7 +80,7 @@ impl LevelPoint {
                 None => format!(
                     "{} periods give the drive to {:.2} % only",
                     self.averaged,
-                    100.0 * u_e_m / e_m
+                    100.0 * uncertainty / drive
                 ),
             },
         })
@@ -214,11 +214,15 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             let Some((held, Regime::Symmetric | Regime::Unresolved)) = before else {
                 continue;
             };
+            let (response, b) = (self.plan.knowledge.target.units.response, self.plan.knowledge.numbers.b);
+            let (c, [held, level]) = (
+                [held / b, level / b],
+                [held, level].map(|metres| response.quantity(metres)),
+            );
             // Only where impacts are reported does a motion without them mean that they have ended.
             match (point.regime, point.regime_by_impacts) {
                 (regime @ (Regime::NoImpacts | Regime::Other), Some(_)) => {
-                    let b = self.plan.knowledge.numbers.b;
-                    return Err(ExperimentError::MotionLost { held, level, b, regime });
+                    return Err(ExperimentError::MotionLost { held, level, c, regime });
                 }
                 (Regime::Other, None) => return Err(ExperimentError::SteadyLost { held, level }),
                 _ => {}

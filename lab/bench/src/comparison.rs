@@ -44,6 +44,9 @@ pub struct Comparison {
     /// Amplitude of the base after the release, m, where it is least, if the base never rests; with its standard uncertainty.
     #[serde(rename = "E_after_release_m", skip_serializing_if = "Option::is_none")]
     pub base_after_release: Option<[f64; 2]>,
+    /// Of a structure that a force drives, its amplitude there, N.
+    #[serde(rename = "F_after_release_N", skip_serializing_if = "Option::is_none")]
+    pub force_after_release: Option<[f64; 2]>,
     /// The exact backbone that the decay is compared with: at phase resonance, whatever the phase target, because no drive acts.
     #[serde(skip)]
     pub curve: ExactCurve,
@@ -112,6 +115,12 @@ impl Comparison {
                 sigma_slow_flow: by_slow_flow(&parameters, point.c),
             })
             .collect();
+        let reference = scene.units().reference;
+        let after_release = found.base_after_release.map(|drive| {
+            let in_unit = [drive.value, drive.uncertainty].map(|metres| reference.of_metres(metres));
+            reference.base_or_force(in_unit)
+        });
+        let [base_after_release, force_after_release] = after_release.unwrap_or_default();
         Self {
             rms_sigma_error: rms(&decay, |row| Some(row.point.sigma - row.sigma_theory?)),
             rms_sigma_exact: rms(&decay, |row| Some(row.point.sigma - row.sigma_exact?)),
@@ -125,7 +134,8 @@ impl Comparison {
             orbits,
             decay,
             decay_end: found.decay.end,
-            base_after_release: found.base_after_release.map(|base| [base.value, base.uncertainty]),
+            base_after_release,
+            force_after_release,
             curve,
         }
     }

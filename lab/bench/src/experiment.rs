@@ -15,9 +15,10 @@ use vines_model::numerics::mean;
 use crate::identification::{Cycle, Departure, Unsteady};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
+use vines_rig::unit::{Quantity, short};
 use vines_scene::knowledge::Target;
 use vines_scene::plan::{DECAYED, Plan};
-use vines_scene::scene::{Unit, Units, key};
+use vines_scene::scene::{Unit, key};
 
 pub use judge::Condition;
 use judge::Judge;
@@ -73,14 +74,30 @@ fn phase_in_words(error: Option<f64>) -> String {
     )
 }
 
-/// A drive beside the requested amplitude, m, in words.
-fn drive_in_words(drive: Drive, requested: f64) -> String {
+/// What the amplitude of a drive in this unit is called.
+fn symbol_of(unit: &str) -> &'static str {
+    if unit == "N" { "F" } else { "E" }
+}
+
+/// A drive beside the requested amplitude, both in the unit of the latter, in words.
+fn drive_in_words(drive: Drive, requested: Quantity) -> String {
+    let Quantity { value: requested, unit } = requested;
+    let (symbol, present) = (symbol_of(unit), if unit == "N" { "force" } else { "displacement" });
     let (of, value) = match drive.amplitude {
-        0.0 => ("E = 0, but a displacement of", drive.displacement.abs()),
-        amplitude => ("E =", amplitude),
+        0.0 => (format!("{symbol} = 0, but a {present} of"), drive.displacement.abs()),
+        amplitude => (format!("{symbol} ="), amplitude),
     };
     let share = short(value / requested);
-    format!("{of} {} m, {share} times the requested drive", short(value))
+    format!("{of} {}, {share} times the requested drive", Quantity { value, unit })
+}
+
+/// A limit of the response in words: as the scene states it, the displacement at the sensor in m, and of what else a sensor reads, the reading.
+fn limit_in_words(limit: f64, target: &Target) -> String {
+    let [stated, read] = [target.units.response.quantity(limit), target.quantity(0, limit)];
+    match stated.unit == read.unit {
+        true => stated.to_string(),
+        false => format!("{stated}, a reading of {read}"),
+    }
 }
 
 /// What a lock waits for that the bench judges, in words.
@@ -110,7 +127,7 @@ pub struct SearchFound {
     pub lost: u32,
     /// Whether the time ended while a motion was to settle, and if so, whether under the constant drive.
     pub unsettled: Option<bool>,
-    /// Half-width of the drawing, m, if the rig does not report impacts: nothing is then said of a particle.
+    /// Half-width of the drawing as a displacement at the sensor, m, if the rig does not report impacts: nothing is then said of a particle.
     pub silent: Option<f64>,
 }
 
@@ -137,7 +154,8 @@ impl SearchFound {
                 tried + "the motion did not settle. Allow more time (phase_lock.acquire_timeout), or try another drive"
             }
             (Some((_, [_, c, _])), _, None) => format!(
-                "{tried}the drive was nearest to the requested one at {} m. Allow more time (phase_lock.acquire_timeout), or try another drive",
+                "{tried}the drive was nearest to the requested one at a response of {} m. Allow more time (phase_lock.acquire_timeout), or try \
+                 another drive",
                 short(c * b)
             ),
         }
@@ -182,21 +200,19 @@ impl Display for SearchFound {
     }
 }
 
-/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded, in the units of the scene.
+/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
-    /// Last reading of the response, m.
-    pub response: f64,
+    /// Last reading of the response.
+    pub response: Quantity,
     /// Last reading of the base or the force, if a sensor reads it.
-    pub reference: Option<f64>,
-    /// Its unit, m or N.
-    pub unit: &'static str,
-    /// Largest response of the period, m.
-    pub largest: f64,
+    pub reference: Option<Quantity>,
+    /// Largest response of the period.
+    pub largest: Quantity,
     /// After the loss of a lock, the mean phase error of the period, degrees; `None` inside: it is not known.
     pub phase_error: Option<Option<f64>>,
-    /// Setting of the controller, its value, and the value's unit.
-    pub limit: Option<(&'static str, Option<f64>, &'static str)>,
+    /// Setting of the controller, and its value with its unit.
+    pub limit: Option<(&'static str, String)>,
     /// Which channel behind a shaker contradicts its past.
     pub contradicts: Option<&'static str>,
 }
@@ -206,19 +222,21 @@ impl Display for Evidence {
         if let Some(error) = self.phase_error {
             write!(f, "over the last period {}; ", phase_in_words(error))?;
         }
-        let name = ["base", "force"][usize::from(self.unit == "N")];
+        let name = match self.reference {
+            Some(Quantity { unit: "N", .. }) => "force",
+            _ => "base",
+        };
         if let Some(channel) = self.contradicts {
             let channel = if channel == "reference" { name } else { channel };
             write!(f, "the {channel} contradicts its past; ")?;
         }
-        write!(f, "the response read {} m", short(self.response))?;
+        write!(f, "the response read {}", self.response)?;
         if let Some(reference) = self.reference {
-            write!(f, ", and the {name} {} {}", short(reference), self.unit)?;
+            write!(f, ", and the {name} {reference}")?;
         }
-        write!(f, "; in the last period at most {} m", short(self.largest))?;
-        if let Some((name, value, unit)) = self.limit {
-            let value = value.map_or_else(|| "none".into(), short);
-            write!(f, "; {} is {value}{unit}", key(name))?;
+        write!(f, "; in the last period at most {}", self.largest)?;
+        if let Some((name, value)) = &self.limit {
+            write!(f, "; {} is {value}", key(name))?;
         }
         Ok(())
     }
@@ -246,10 +264,10 @@ pub enum ExperimentError {
     },
     #[error("no lock within {periods:.0} periods at the requested drive{}: {found}", found.requested_in_words())]
     NotReached { periods: f64, found: Box<SearchFound> },
-    #[error("no lock: the motion, held at a response of {response:.4e} m for {periods} periods, is not steady: {why}")]
+    #[error("no lock: the motion, held at a response of {response:.4e} for {periods} periods, is not steady: {why}")]
     NotSteady {
         periods: usize,
-        response: f64,
+        response: Quantity,
         why: Unsteady,
     },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {evidence}", stage.name())]
@@ -260,14 +278,15 @@ pub enum ExperimentError {
         evidence: Box<Evidence>,
     },
     #[error(
-        "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
+        "the 1:1 motion, held at {held:.4e} (C = {:.4}), is {regime} at {level:.4e} (C = {:.4}): the backbone ends between the two, or the \
          step was too large",
-        held / b, level / b
+        c[0], c[1]
     )]
     MotionLost {
-        held: f64,
-        level: f64,
-        b: f64,
+        held: Quantity,
+        level: Quantity,
+        /// Both over the half-width.
+        c: [f64; 2],
         regime: crate::identification::Regime,
     },
     #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
@@ -281,9 +300,9 @@ pub enum ExperimentError {
         /// Natural periods.
         periods: f64,
         allowed: f64,
+        /// In the unit of the requested drive.
         drive: Drive,
-        /// m
-        requested: f64,
+        requested: Quantity,
     },
     #[error(
         "the controller drives again: {periods:.1} periods after it released the drive, it commands {}; the drive is off",
@@ -292,47 +311,41 @@ pub enum ExperimentError {
     DrivesAgain {
         /// Natural periods.
         periods: f64,
+        /// In the unit of the requested drive.
         drive: Drive,
-        /// m
-        requested: f64,
+        requested: Quantity,
     },
     #[error(
-        "the motion, steady at a response of {held:.4e} m, is irregular at {level:.4e} m: it ends between the two, or the step was too large"
+        "the motion, steady at a response of {held:.4e}, is irregular at {level:.4e}: it ends between the two, or the step was too large"
     )]
-    SteadyLost { held: f64, level: f64 },
-    #[error("the scene has no drive, E = 0, so that nothing can lock")]
+    SteadyLost { held: Quantity, level: Quantity },
+    #[error("the scene has no drive, so that nothing can lock")]
     NoDrive,
-    #[error("the controller answered {name} = {value} {unit}; it must be {allowed}. The drive is off")]
+    #[error("the controller answered {name} = {value}; it must be {allowed}. The drive is off")]
     Command {
         name: &'static str,
-        value: f64,
-        unit: &'static str,
+        value: Quantity,
         allowed: &'static str,
     },
     #[error(
-        "the controller asked for {} {}, and {} allows {} {}; the drive is off. Its output E is {}",
-        short(*amplitude), unit.symbol, key("amplitude_max"), short(*limit), unit.symbol,
-        match unit.symbol {
-            "N" => format!("the force over {} N/m, in m", short(unit.of_metres(1.0))),
+        "the controller asked for {amplitude}, and {} allows {limit}; the drive is off. Its output E is {}",
+        key("amplitude_max"),
+        match per_metre.unit {
+            "N" => format!("the force over {per_metre}/m, in m"),
             _ => "the amplitude of the base in metres".into(),
         }
     )]
     DriveTooLarge {
-        /// In its unit.
-        amplitude: f64,
-        limit: f64,
-        unit: Unit,
+        amplitude: Quantity,
+        limit: Quantity,
+        /// The drive for which the controller's output is 1 m.
+        per_metre: Quantity,
     },
     #[error(
-        "the response read {} {unit}, and {} allows {} {unit}, but the controller did not stop; the drive is off",
-        short(*response), key("response_max"), short(*limit)
+        "the response read {response}, and {} allows {limit}, but the controller did not stop; the drive is off",
+        key("response_max")
     )]
-    ResponseTooLarge {
-        /// In its unit.
-        response: f64,
-        limit: f64,
-        unit: &'static str,
-    },
+    ResponseTooLarge { response: Quantity, limit: String },
     #[error(
         "the controller asked for omega = {} rad/s; the scene allows {} to {} rad/s ({}, {}), and a factor of 2 pi lies between. omega is an \
          angular frequency in rad/s, not in Hz; the drive is off",
@@ -515,19 +528,19 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         let active = !matches!(stage, Stage::Releasing | Stage::Decaying);
         let clock = [self.taken as f64 * self.sample_time, self.sample_time];
         let is_latched = |command: &Command| command.state.is_some_and(LoopState::is_latched);
-        let (requested, since_release) = (self.plan.amplitude, self.natural_periods(self.taken - self.stage.1 + 1));
-        let (config, units) = (self.config, self.plan.knowledge.target.units);
+        let since_release = self.natural_periods(self.taken - self.stage.1 + 1);
+        let (config, plan, target) = (self.config, self.plan, self.plan.knowledge.target);
         let (samples, driven) = (&mut *self.samples, &mut self.driven);
         let before_drive = |sample: &Sample| {
-            let command = checked(sample.command)?;
+            let command = checked(sample.command, target.units.reference)?;
             samples.push(*sample);
             let is_off = is_off(command.drive);
             if stage == Stage::Decaying && !is_off {
-                let drive = command.drive;
+                let (drive, requested) = beside_requested(command.drive, plan);
                 return Err(ExperimentError::DrivesAgain { periods: since_release, drive, requested });
             }
             if (active || !is_off) && !is_latched(&command) {
-                guard(config, units, sample.sensors.response, command.drive)?;
+                guard(config, &target, sample.sensors.response, command.drive)?;
             }
             *driven = true;
             Ok(())
@@ -564,7 +577,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
 
     /// Asks the controller to release the drive, and waits for the end of its ramp. Returns the index of the first sample without a drive.
     fn release(&mut self) -> Result<usize, ExperimentError> {
-        let Plan { ramp, amplitude, .. } = *self.plan;
+        let ramp = self.plan.ramp;
         for _ in 0..ramp.max(1) {
             self.sample(Stage::Releasing)?;
             if is_off(self.last.drive) {
@@ -572,12 +585,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             }
         }
         let allowed = self.natural_periods(ramp);
-        Err(ExperimentError::NotReleased {
-            periods: allowed,
-            allowed,
-            drive: self.last.drive,
-            requested: amplitude,
-        })
+        let (drive, requested) = beside_requested(self.last.drive, self.plan);
+        Err(ExperimentError::NotReleased { periods: allowed, allowed, drive, requested })
     }
 
     /// Samples so far, and of these the ones with the command of a shaker at the limit of its amplifier.
@@ -639,7 +648,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             // A ramp never rises, whatever the controller says.
             let falls = |amplitude: &f64| *amplitude < command.drive.amplitude;
             let falling = Some(asked.drive).filter(|drive| falls(&drive.amplitude));
-            command = checked(Command { drive: falling.unwrap_or_default(), ..asked })?;
+            let reference = self.plan.knowledge.target.units.reference;
+            command = checked(Command { drive: falling.unwrap_or_default(), ..asked }, reference)?;
             self.advance(command.drive)?;
         }
         Ok(())
@@ -650,7 +660,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if fault == Fault::TimedOut {
             return self.no_lock(command);
         }
-        let mut evidence = evidence(self.samples, self.config, self.plan.knowledge.target.units, fault);
+        let mut evidence = evidence(self.samples, self.config, &self.plan.knowledge.target, fault);
         if let Some(path) = self.plan.knowledge.shaker {
             evidence.contradicts = contradicts(self.samples, self.sample_time, path.drop_out());
         }
@@ -711,21 +721,29 @@ fn is_off(drive: Drive) -> bool {
     drive.amplitude == 0.0 && drive.displacement == 0.0
 }
 
+/// A drive in metres of the oscillator, and the requested amplitude: both in the unit of the reference.
+fn beside_requested(drive: Drive, plan: &Plan) -> (Drive, Quantity) {
+    let unit = plan.knowledge.target.units.reference;
+    (
+        drive.map(|metres| unit.of_metres(metres)),
+        unit.quantity(plan.amplitude),
+    )
+}
+
 /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
-fn guard(config: &Config, units: Units, response: f64, drive: Drive) -> Result<(), ExperimentError> {
+fn guard(config: &Config, target: &Target, response: f64, drive: Drive) -> Result<(), ExperimentError> {
     let Config { amplitude_max, response_max, omega_min, omega_max, .. } = *config;
     let Drive { omega, amplitude, .. } = drive;
     // A controller may compute in single precision.
     let beyond = |value: f64, limit: Option<f64>| limit.filter(|limit| value > limit * (1.0 + 1e-6));
     if let Some(limit) = beyond(amplitude, amplitude_max) {
-        let unit = units.reference;
-        let [amplitude, limit] = [amplitude, limit].map(|value| unit.of_metres(value));
-        return Err(ExperimentError::DriveTooLarge { amplitude, limit, unit });
+        let [amplitude, limit, per_metre] =
+            [amplitude, limit, 1.0].map(|metres| target.units.reference.quantity(metres));
+        return Err(ExperimentError::DriveTooLarge { amplitude, limit, per_metre });
     }
     if let Some(limit) = beyond(response.abs(), response_max) {
-        let [response, limit] = [response, limit].map(|value| units.response.of_metres(value));
-        let unit = units.response.symbol;
-        return Err(ExperimentError::ResponseTooLarge { response, limit, unit });
+        let (response, limit) = (target.quantity(0, response), limit_in_words(limit, target));
+        return Err(ExperimentError::ResponseTooLarge { response, limit });
     }
     let allowed = [omega_min, omega_max];
     let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
@@ -735,26 +753,29 @@ fn guard(config: &Config, units: Units, response: f64, drive: Drive) -> Result<(
     Ok(())
 }
 
-/// A command with values that a rig and an identification can take.
-fn checked(command: Command) -> Result<Command, ExperimentError> {
+/// A command with values that a rig and an identification can take; `reference`: the unit of its drive in messages.
+fn checked(command: Command, reference: Unit) -> Result<Command, ExperimentError> {
     let Drive { omega, amplitude, displacement } = command.drive;
-    let error = |(name, value, unit, allowed)| ExperimentError::Command { name, value, unit, allowed };
-    let positive = [("omega", omega, "rad/s"), ("E", amplitude, "m")]
-        .map(|(name, value, unit)| (name, value, unit, "a finite number, 0 or above"));
-    let finite = [
-        ("drive", displacement, "m"),
-        ("phase_error", command.phase_error.unwrap_or(0.0), "rad"),
-    ]
-    .map(|(name, value, unit)| (name, value, unit, "a finite number"));
-    let refused = positive
-        .into_iter()
-        .find(|(_, value, ..)| !(value.is_finite() && *value >= 0.0))
-        .or_else(|| finite.into_iter().find(|(_, value, ..)| !value.is_finite()));
-    refused.map_or(Ok(command), |refused| Err(error(refused)))
+    let phase_error = command.phase_error.unwrap_or(0.0);
+    let refused = |name, value, allowed| Err(ExperimentError::Command { name, value, allowed });
+    let [frequency, phase_error] =
+        [(omega, "rad/s"), (phase_error, "rad")].map(|(value, unit)| Quantity { value, unit });
+    let [amplitude, displacement] = [amplitude, displacement].map(|metres| reference.quantity(metres));
+    for (name, quantity) in [("omega", frequency), (symbol_of(reference.symbol), amplitude)] {
+        if !(quantity.value.is_finite() && quantity.value >= 0.0) {
+            return refused(name, quantity, "a finite number, 0 or above");
+        }
+    }
+    for (name, quantity) in [("drive", displacement), ("phase_error", phase_error)] {
+        if !quantity.value.is_finite() {
+            return refused(name, quantity, "a finite number");
+        }
+    }
+    Ok(command)
 }
 
 /// What was read before a fault.
-fn evidence(samples: &[Sample], config: &Config, units: Units, fault: Fault) -> Evidence {
+fn evidence(samples: &[Sample], config: &Config, target: &Target, fault: Fault) -> Evidence {
     let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
     let driven = samples.len() as f64 * config.sample_time;
     let samples = &samples[samples.len().saturating_sub(period)..];
@@ -767,25 +788,28 @@ fn evidence(samples: &[Sample], config: &Config, units: Units, fault: Fault) -> 
         let errors: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
         errors.map(|errors| mean(errors).to_degrees())
     });
+    let stated = |limit: Option<f64>, unit| limit.map(|value| Quantity { value, unit }.to_string());
     let limit = match fault {
         Fault::ResponseTooLarge => {
-            let limit = config.response_max.map(|limit| units.response.of_metres(limit));
-            Some(("response_max", limit, " m"))
+            let limit = config.response_max.map(|limit| limit_in_words(limit, target));
+            Some(("response_max", limit))
         }
-        Fault::LockLost => Some(("lock.unlock_tolerance", Some(config.lock.unlock_tolerance), " rad")),
+        Fault::LockLost => Some((
+            "lock.unlock_tolerance",
+            stated(Some(config.lock.unlock_tolerance), "rad"),
+        )),
         // The first periods contradict their drive.
         Fault::NoSignal if config.signal_timeout.is_some_and(|limit| driven < limit) => None,
-        Fault::NoSignal => Some(("signal_timeout", config.signal_timeout, " s")),
-        Fault::Implausible => Some(("residual_max", config.residual_max, " of the amplitude")),
+        Fault::NoSignal => Some(("signal_timeout", stated(config.signal_timeout, "s"))),
+        Fault::Implausible => Some(("residual_max", stated(config.residual_max, "of the amplitude"))),
         Fault::Sensor | Fault::TimedOut => None,
     };
     Evidence {
-        response: units.response.of_metres(last.response),
-        reference: last.reference.map(|value| units.reference.of_metres(value)),
-        unit: units.reference.symbol,
-        largest: units.response.of_metres(largest),
+        response: target.quantity(0, last.response),
+        reference: last.reference.map(|value| target.quantity(1, value)),
+        largest: target.quantity(0, largest),
         phase_error,
-        limit,
+        limit: limit.map(|(name, value)| (name, value.unwrap_or_else(|| "none".into()))),
         contradicts: None,
     }
 }
@@ -815,12 +839,6 @@ fn contradicts(samples: &[Sample], sample_time: f64, drop_out: f64) -> Option<&'
     Some(if is_force { "reference" } else { "response" })
 }
 
-/// Five digits, with an exponent if the number is very small or large.
-fn short(value: f64) -> String {
-    let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
-    format!("{rounded:?}").trim_end_matches(".0").into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -842,15 +860,20 @@ mod tests {
             (Fault::LockLost, "phase_lock.lock.unlock_tolerance is 0.2 rad"),
             (Fault::LockLost, "the phase error is 14.324 degrees"),
         ] {
-            let text = evidence(&samples, &scene.controller_config(), scene.units(), fault).to_string();
+            let target = scene.knowledge().target;
+            let text = evidence(&samples, &scene.controller_config(), &target, fault).to_string();
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
         // Under a force, 0.01 m of the driven mode's base are newtons, and its response is read at the sensor.
         let text = include_str!("../../../scenes/frame.toml");
         let force = Scene::parse("frame.toml", text, &[]).unwrap();
-        let Units { reference, response, .. } = force.units();
-        let [newtons, metres] = [reference.of_metres(0.01), response.of_metres(0.2)].map(short);
-        let text = evidence(&samples, &force.controller_config(), force.units(), Fault::Sensor).to_string();
+        let target = force.knowledge().target;
+        let [newtons, metres] = [
+            target.units.reference.of_metres(0.01),
+            target.units.response.of_metres(0.2),
+        ]
+        .map(short);
+        let text = evidence(&samples, &force.controller_config(), &target, Fault::Sensor).to_string();
         assert!(
             text.contains(&format!("the response read {metres} m, and the force {newtons} N")),
             "{text}"

@@ -15,7 +15,7 @@ use vines_model::Definition;
 use vines_model::numerics::{Estimate, SIGNIFICANT};
 use vines_scene::linear::{MeasuredLinear, ParticleState};
 pub use vines_scene::scene::table::{Channel, Contents, plain_table};
-use vines_scene::scene::{Parameters, Scene};
+use vines_scene::scene::{Parameters, Scene, Units};
 
 use crate::identification::ResonancePoint;
 
@@ -25,15 +25,18 @@ pub use recording::{LinearDecay, Recording, RecordingError, Stretch};
 /// Standard uncertainty of the gain of a reference that was calibrated as usual, relative.
 pub const CALIBRATION: f64 = 0.01;
 
-impl From<&ResonancePoint> for MeasuredPoint {
-    fn from(at: &ResonancePoint) -> Self {
+impl ResonancePoint {
+    /// The point, which was measured in these units, in metres of the oscillator.
+    #[must_use]
+    pub fn measured(&self, units: &Units) -> MeasuredPoint {
         let estimate = |value, uncertainty| Estimate { value, uncertainty };
-        Self {
-            response: estimate(at.a_m, at.u_a_m),
-            omega: estimate(at.f_hz, at.u_f_hz).scaled(TAU),
-            drive: estimate(at.e_m, at.u_e_m),
-            phase: at.phase_target_deg.to_radians(),
-        }
+        let measured = MeasuredPoint {
+            response: estimate(self.a_m, self.u_a_m),
+            omega: estimate(self.f_hz, self.u_f_hz).scaled(TAU),
+            drive: self.drive(),
+            phase: self.phase_target_deg.to_radians(),
+        };
+        measured.in_metres(units)
     }
 }
 

@@ -13,9 +13,10 @@ use thiserror::Error;
 use vines_model::numerics::{Estimate, SIGNIFICANT, mean, standard_deviation};
 
 use crate::record::{Record, Sample};
+use vines_rig::unit::Quantity;
 use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
-use vines_scene::scene::Measurand;
+use vines_scene::scene::{Measurand, Units};
 
 pub(crate) use asked::Departure;
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
@@ -40,14 +41,18 @@ pub enum IdentificationError {
         regime: Regime,
         sigma: f64,
         c: f64,
-        /// Frequency, Hz, and response, m, of a rig that does not report impacts: nothing is then said of a particle.
-        silent: Option<[f64; 2]>,
+        /// Frequency, Hz, and response of a rig that does not report impacts: nothing is then said of a particle.
+        silent: Option<(f64, Quantity)>,
     },
     #[error(
-        "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion repeats only after {periods} periods of the drive. Try another \
-         drive or another [start]"
+        "the loop is locked at {f_hz:.5} Hz with a response of {response:.4e}, but the motion repeats only after {periods} periods of the drive. Try \
+         another drive or another [start]"
     )]
-    Repeats { periods: usize, f_hz: f64, a_m: f64 },
+    Repeats {
+        periods: usize,
+        f_hz: f64,
+        response: Quantity,
+    },
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the motion repeats only after {periods} periods of the drive: it is not 1:1. Try \
          another [start] (the particle must be moving) or another G"
@@ -73,10 +78,10 @@ pub enum IdentificationError {
 }
 
 /// That a lock is of another regime than the symmetric 1:1 one.
-fn regime_in_words(regime: Regime, [sigma, c]: [f64; 2], silent: Option<[f64; 2]>) -> String {
+fn regime_in_words(regime: Regime, [sigma, c]: [f64; 2], silent: Option<(f64, Quantity)>) -> String {
     match silent {
-        Some([f_hz, a_m]) => format!(
-            "the loop is locked at {f_hz:.5} Hz with a response of {a_m:.4e} m, but the motion is {}, and not steady and nonlinear. Try another drive \
+        Some((f_hz, response)) => format!(
+            "the loop is locked at {f_hz:.5} Hz with a response of {response:.4e}, but the motion is {}, and not steady and nonlinear. Try another drive \
              or another [start]",
             regime.motion()
         ),
@@ -108,7 +113,8 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     let knowledge = plan.knowledge;
     let lock = measure(record, plan).ok_or(IdentificationError::NoMotion)?;
     let ResonancePoint { f_hz, a_m, sigma, c, .. } = lock.at;
-    let silent = lock.regime_by_impacts.is_none().then_some([f_hz, a_m]);
+    let response = Quantity { value: a_m, unit: knowledge.target.units.response.symbol };
+    let silent = lock.regime_by_impacts.is_none().then_some((f_hz, response));
     let subharmonic = subharmonic(record.hold(), &knowledge, TAU * f_hz);
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so. So is one without symmetry where
     // there may be no cavity.
@@ -128,7 +134,7 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     }
     if let Some(periods) = subharmonic {
         return Err(match silent {
-            Some(_) => IdentificationError::Repeats { periods, f_hz, a_m },
+            Some(_) => IdentificationError::Repeats { periods, f_hz, response },
             None => IdentificationError::Subharmonic { periods, sigma, c },
         });
     }
@@ -163,8 +169,11 @@ pub struct Lock {
     #[serde(flatten)]
     pub at: ResonancePoint,
     /// Requested amplitude of the base, m; of a base that is held from sample to sample, which moves a little less than its samples, what is left.
-    #[serde(rename = "E_requested_m")]
-    pub requested_e_m: f64,
+    #[serde(rename = "E_requested_m", skip_serializing_if = "Option::is_none")]
+    pub requested_e_m: Option<f64>,
+    /// Of a structure that a force drives, its requested amplitude, N.
+    #[serde(rename = "F_requested_N", skip_serializing_if = "Option::is_none")]
+    pub requested_f_n: Option<f64>,
     /// Whether the drive of the point is the requested one: within 1 %, or within three standard uncertainties if these are more.
     pub at_requested_drive: bool,
     /// Mean particle speed over `b omega0`; absent if the rig does not report it.
@@ -229,6 +238,11 @@ impl Friction {
 }
 
 impl Lock {
+    /// The requested amplitude of the drive, in its unit.
+    pub fn requested(&self) -> f64 {
+        self.requested_e_m.or(self.requested_f_n).unwrap_or(f64::NAN)
+    }
+
     /// The number of impacts per period, or the note that the regime was determined without it.
     pub fn impacts(&self) -> String {
         if self.impacts_per_period.is_nan() {
@@ -283,15 +297,18 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
     let [stated_base, stated_omega] = level.stated();
-    let requested = plan.requested(omega.value);
+    let reference = knowledge.target.units.reference;
+    let requested = reference.of_metres(plan.requested(omega.value));
+    let [requested_e_m, requested_f_n] = reference.base_or_force(requested);
     let at = ResonancePoint::new(
         [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
         knowledge,
     );
     Some(Lock {
         at,
-        requested_e_m: requested,
-        at_requested_drive: !asked::is_another(at.e_m - requested, at.u_e_m, requested),
+        requested_e_m,
+        requested_f_n,
+        at_requested_drive: !asked::is_another(at.drive().value - requested, at.drive().uncertainty, requested),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),
@@ -352,18 +369,21 @@ fn phase_error(held: &[Cycle], knowledge: &Knowledge) -> Estimate {
 
 // A measured point of phase resonance.
 
-/// A point of phase resonance as measured, in hertz and metres, and dimensionless with the parameters of the scene.
+/// A point of phase resonance as measured, in hertz and in the units of response and reference, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ResonancePoint {
     /// Frequency, Hz.
     #[serde(rename = "f_Hz")]
     pub f_hz: f64,
-    /// Amplitude of the fundamental of the response, m.
+    /// Amplitude of the fundamental of the response: its displacement at the sensor, m.
     #[serde(rename = "A_m")]
     pub a_m: f64,
     /// Base amplitude, m, measured if a sensor reads the base, otherwise commanded.
-    #[serde(rename = "E_m")]
-    pub e_m: f64,
+    #[serde(rename = "E_m", skip_serializing_if = "Option::is_none")]
+    pub e_m: Option<f64>,
+    /// Of a structure that a force drives, its amplitude, N.
+    #[serde(rename = "F_N", skip_serializing_if = "Option::is_none")]
+    pub f_n: Option<f64>,
     /// Standard uncertainty of the frequency, Hz.
     #[serde(rename = "u_f_Hz")]
     pub u_f_hz: f64,
@@ -371,11 +391,8 @@ pub struct ResonancePoint {
     #[serde(rename = "u_A_m")]
     pub u_a_m: f64,
     /// Standard uncertainty of the base amplitude, m.
-    #[serde(rename = "u_E_m")]
-    pub u_e_m: f64,
-    /// Of a structure that a force drives, its amplitude, N.
-    #[serde(rename = "F_N", skip_serializing_if = "Option::is_none")]
-    pub f_n: Option<f64>,
+    #[serde(rename = "u_E_m", skip_serializing_if = "Option::is_none")]
+    pub u_e_m: Option<f64>,
     /// Standard uncertainty of the force, N.
     #[serde(rename = "u_F_N", skip_serializing_if = "Option::is_none")]
     pub u_f_n: Option<f64>,
@@ -404,21 +421,22 @@ pub struct ResonancePoint {
 }
 
 impl ResonancePoint {
-    /// From the amplitudes of response and base, m, the frequency, rad/s, and the phase error, rad.
+    /// From the amplitudes of response and drive, both in metres of the oscillator, the frequency, rad/s, and the phase error, rad.
     pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], knowledge: &Knowledge) -> Self {
         let d = &knowledge.numbers;
         let [response, base, omega] = knowledge.linear.resolved([response, base, omega]);
-        let reference = knowledge.target.units.reference;
-        let force = |amplitude: f64| (reference.symbol == "N").then(|| reference.of_metres(amplitude));
+        let Units { response: of_response, reference, .. } = knowledge.target.units;
+        let drive = |metres: f64| reference.base_or_force(reference.of_metres(metres));
+        let ([e_m, f_n], [u_e_m, u_f_n]) = (drive(base.value), drive(base.uncertainty));
         Self {
             f_hz: omega.value / TAU,
-            a_m: response.value,
-            e_m: base.value,
+            a_m: of_response.of_metres(response.value),
+            e_m,
+            f_n,
             u_f_hz: omega.uncertainty / TAU,
-            u_a_m: response.uncertainty,
-            u_e_m: base.uncertainty,
-            f_n: force(base.value),
-            u_f_n: force(base.uncertainty),
+            u_a_m: of_response.of_metres(response.uncertainty),
+            u_e_m,
+            u_f_n,
             sigma: d.sigma(omega.value),
             c: response.value / d.b,
             g: d.excitation(base.value),
@@ -428,6 +446,15 @@ impl ResonancePoint {
             u_c: response.uncertainty / d.b,
             u_g: d.excitation(base.uncertainty),
             u_phase_deg: phase_error.uncertainty.to_degrees(),
+        }
+    }
+
+    /// Amplitude of the drive in the unit of the reference, of a base or a force.
+    pub fn drive(&self) -> Estimate {
+        let either = |base: Option<f64>, force| base.or(force).unwrap_or(f64::NAN);
+        Estimate {
+            value: either(self.e_m, self.f_n),
+            uncertainty: either(self.u_e_m, self.u_f_n),
         }
     }
 }

@@ -19,6 +19,7 @@ use vines_scene::knowledge::Target;
 use vines_scene::linear::LinearResponse;
 use vines_scene::linear::{MeasuredLinear, ParticleState};
 use vines_scene::plan::Plan;
+use vines_scene::scene::{Unit, Units};
 
 /// Drives of the check, over the scene's drive: too small for impacts. The smaller one follows where the particle may have slid.
 const SHARES: [f64; 2] = [0.01, 0.01 / 16.0];
@@ -32,7 +33,7 @@ const CHECK_PERIODS: [usize; 3] = [2, 24, 4];
 pub struct LoopCheck {
     /// The verdict.
     pub verdict: Verdict,
-    /// Amplitude of the drive, m.
+    /// Amplitude of the drive, in its unit.
     pub amplitude: f64,
     /// It over the scene's drive.
     pub share: f64,
@@ -109,7 +110,13 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
         let raised = at_share(rig, plan, most.min(RAISE * found.share), MOST_WAITS)?;
         found = LoopCheck { periods: found.periods + raised.periods, ..raised };
     }
-    Ok(found)
+    let Units { response, reference, .. } = plan.knowledge.target.units;
+    Ok(LoopCheck {
+        amplitude: reference.of_metres(found.amplitude),
+        response: found.response.in_unit(response),
+        base: found.base.map(|base| base.in_unit(reference)),
+        ..found
+    })
 }
 
 /// The check at this share of the drive, after `waits` at most.
@@ -504,13 +511,19 @@ pub struct CheckedChannel {
     pub phase: f64,
     /// This phase as a delay, samples.
     pub delay: f64,
-    /// RMS of everything else, m.
+    /// RMS of everything else, as a displacement in m or as a force in N.
     pub noise: f64,
-    /// RMS without a drive, m.
+    /// RMS without a drive, in the same unit.
     pub floor: f64,
 }
 
 impl CheckedChannel {
+    /// What is in metres of the oscillator, in this unit.
+    fn in_unit(self, unit: Unit) -> Self {
+        let [noise, floor] = [self.noise, self.floor].map(|metres| unit.of_metres(metres));
+        Self { noise, floor, ..self }
+    }
+
     /// With another ratio to the expected phasor; `turn`: phase of a sample, rad.
     fn at(self, ratio: Complex64, turn: f64) -> Self {
         Self {

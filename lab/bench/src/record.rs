@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use crate::rig::{Command, Drive, GroundTruth, Sensors};
 use vines_scene::knowledge::Target;
-use vines_scene::scene::{Measurand, Units};
 
 /// One sample of the record.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -23,10 +22,8 @@ pub struct Sample {
 
 /// First line of a recording (CSV) of a rig with the channels of `target`, with the units that are not m.
 pub fn headings(target: &Target) -> String {
-    let Units { command, reference, .. } = target.units;
-    let [response, base] = target.measurands.map(Measurand::unit);
-    let reference = if reference.symbol == "N" { "N" } else { base };
-    let [response, reference, command] = [response, reference, command.symbol].map(|unit| match unit {
+    let units = [target.unit(0), target.unit(1), target.units.command.symbol];
+    let [response, reference, command] = units.map(|unit| match unit {
         "m" => String::new(),
         other => format!(" [{other}]"),
     });

@@ -4,21 +4,46 @@ use std::f64::consts::FRAC_PI_2;
 
 use vines_model::Definition;
 use vines_model::numerics::Estimate;
+use vines_scene::scene::{Unit, Units};
 
 /// A measured point of the backbone: of phase resonance, or at another phase target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredPoint {
-    /// Amplitude of the fundamental of the response, m.
+    /// Amplitude of the fundamental of the response, metres of the oscillator.
     pub response: Estimate,
     /// Angular frequency, rad/s.
     pub omega: Estimate,
-    /// Amplitude of the base, m.
+    /// Amplitude of the base, metres of the oscillator.
     pub drive: Estimate,
     /// Phase of the response relative to the base at which it was measured, rad.
     pub phase: f64,
 }
 
 impl MeasuredPoint {
+    /// This point with response and drive, which are in these units, in metres of the oscillator.
+    #[must_use]
+    pub fn in_metres(self, units: &Units) -> Self {
+        self.each(units, Unit::in_metres)
+    }
+
+    /// This point with response and drive in these units.
+    #[must_use]
+    pub fn in_units(self, units: &Units) -> Self {
+        self.each(units, Unit::of_metres)
+    }
+
+    fn each(self, units: &Units, convert: fn(Unit, f64) -> f64) -> Self {
+        let converted = |unit, Estimate { value, uncertainty }| Estimate {
+            value: convert(unit, value),
+            uncertainty: convert(unit, uncertainty),
+        };
+        Self {
+            response: converted(units.response, self.response),
+            drive: converted(units.reference, self.drive),
+            ..self
+        }
+    }
+
     /// The point of phase resonance with this response, to first order: `E_R = E cos p` and `omega_R = omega + (omega/2) (E/A) sin p` for a phase of p
     /// beyond phase resonance.
     pub(crate) fn at_resonance(&self, definition: Definition) -> Self {

@@ -1,6 +1,36 @@
-//! Units of measured channels and of variables.
+//! Units of measured channels and of variables, and values with their units.
 
 use std::f64::consts::{PI, TAU};
+use std::fmt::{self, Display, Formatter, LowerExp};
+
+/// A value in the unit of its channel, as messages state it: with five digits, or with those that a format `e` asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity {
+    /// The value.
+    pub value: f64,
+    /// Symbol of its unit.
+    pub unit: &'static str,
+}
+
+impl Display for Quantity {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", short(self.value), self.unit)
+    }
+}
+
+impl LowerExp for Quantity {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        LowerExp::fmt(&self.value, f)?;
+        write!(f, " {}", self.unit)
+    }
+}
+
+/// Five digits, with an exponent if the number is very small or large.
+#[must_use]
+pub fn short(value: f64) -> String {
+    let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
+    format!("{rounded:?}").trim_end_matches(".0").into()
+}
 
 /// Symbols, SI units per unit, and the SI unit.
 pub(crate) const UNITS: [(&str, f64, &str); 40] = [

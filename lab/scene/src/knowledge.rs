@@ -7,6 +7,7 @@ use lovines::{Cavity, Parameters, Restitution};
 use num_complex::Complex64;
 use vines_model::numerics::{Estimate, mean, noise, noise_at};
 use vines_model::{Definition, Dimensionless, Measurand, Sensor};
+use vines_rig::unit::Quantity;
 use vines_rig::{Drive, Sensors};
 
 use crate::filter::LowPass;
@@ -49,6 +50,23 @@ impl Target {
         unit.in_metres(reading) * self.scale(channel)
     }
 
+    /// A scaled reading of a channel, in the unit of the channel: the inverse of [`Target::in_metres`].
+    pub fn quantity(&self, channel: usize, scaled: f64) -> Quantity {
+        let unit = [self.units.response, self.units.reference][channel];
+        Quantity {
+            value: unit.of_metres(scaled / self.scale(channel)),
+            unit: self.unit(channel),
+        }
+    }
+
+    /// Symbol of the unit of the readings of a channel.
+    pub fn unit(&self, channel: usize) -> &'static str {
+        match self.units.reference.symbol {
+            "N" if channel == 1 => "N",
+            _ => self.measurands[channel].unit(),
+        }
+    }
+
     /// Readings in the units of their channels as displacements in metres of the oscillator, as a loop with this target takes them.
     #[must_use]
     pub fn scaled(&self, sensors: Sensors) -> Sensors {
@@ -61,12 +79,10 @@ impl Target {
     /// Readings in the units of their channels, from [`Target::scaled`].
     #[must_use]
     pub fn unscaled(&self, sensors: Sensors) -> Sensors {
-        let Units { response, reference, .. } = self.units;
+        let reading = |channel, scaled| self.quantity(channel, scaled).value;
         Sensors {
-            response: response.of_metres(sensors.response / self.scale(0)),
-            reference: sensors
-                .reference
-                .map(|value| reference.of_metres(value / self.scale(1))),
+            response: reading(0, sensors.response),
+            reference: sensors.reference.map(|value| reading(1, value)),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The units of a rig's channels, and what one unit is in the metres of the oscillator that loop, theory and exact orbits are those of.
 
+use vines_rig::unit::Quantity;
+
 /// The unit of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
@@ -31,6 +33,21 @@ impl Unit {
     /// Metres of the oscillator, in this unit.
     pub fn of_metres(self, metres: f64) -> f64 {
         metres * self.ratio[0] / self.ratio[1]
+    }
+
+    /// Metres of the oscillator, in this unit and with it.
+    pub fn quantity(self, metres: f64) -> Quantity {
+        Quantity { value: self.of_metres(metres), unit: self.symbol }
+    }
+}
+
+impl Unit {
+    /// A drive in this unit, as the motion of a base or as a force: in files they have different names.
+    pub fn base_or_force<T>(self, drive: T) -> [Option<T>; 2] {
+        match self.symbol {
+            "N" => [None, Some(drive)],
+            _ => [Some(drive), None],
+        }
     }
 }
 

@@ -13,7 +13,8 @@ use super::summary;
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
-  frequency, response, base   in Hz and m: all that is said of a rig that does not report impacts; in the files always (f_Hz, A_m, E_m)
+  frequency, response, base   in Hz and m, a force in N: all that is said of a rig that does not report impacts; in the files always (f_Hz,
+              A_m, and E_m or F_N)
   motion      what the response shows: near the linear response, nonlinear and symmetric or asymmetric, irregular
   C           amplitude of the first harmonic of the response that the scene's sensor reads, over b
   sigma       detuning (Omega - 1)/epsilon of resonance as [resonance] defines it
@@ -60,7 +61,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let result = TrackedComparison::of(&tracked, &scene);
     let mut text = summary::tracked(&result, &scene) + &summary::structure(&scene, result.reports_impacts());
     let settled = result.points.iter().filter(|compared| compared.is_of_backbone());
-    let points: Vec<_> = settled.map(|compared| (&compared.point.at).into()).collect();
+    let units = scene.units();
+    let points: Vec<_> = settled.map(|compared| compared.point.at.measured(&units)).collect();
     let (settled, of) = (points.len(), result.points.len());
     if settled < of {
         let motion = match result.reports_impacts() {

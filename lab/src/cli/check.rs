@@ -4,7 +4,7 @@ use clap::Args;
 use vines::experiment::ExperimentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
-use vines::scene::{Excitation, Scene, Units};
+use vines::scene::{Excitation, Scene};
 use vines::{
     cells,
     table::{Table, number, with_uncertainty},
@@ -109,14 +109,10 @@ pub(super) fn named(text: &str, scene: &Scene) -> String {
 }
 
 pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
-    let Units { reference, response, .. } = scene.units();
-    let channels = [
-        ("response", Some(&checked.response), response),
-        ("base", checked.base.as_ref(), reference),
-    ];
-    let rows = channels.into_iter().filter_map(|(name, channel, unit)| {
+    let channels = [("response", Some(&checked.response)), ("base", checked.base.as_ref())];
+    let rows = channels.into_iter().filter_map(|(name, channel)| {
         let CheckedChannel { gain, phase, delay, noise, floor, .. } = channel?;
-        let noises = [noise, floor].map(|noise| format!("{:.1e}", unit.of_metres(*noise)));
+        let noises = [noise, floor].map(|noise| format!("{noise:.1e}"));
         let numbers = [format!("{gain:.3}"), format!("{phase:.1}"), format!("{delay:.1}")];
         Some([&[named(name, scene)][..], &numbers, &noises].concat())
     });
@@ -144,11 +140,11 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
         Some(Excitation::Force) => "F",
         _ => "E",
     };
-    let (amplitude, verdict) = (
-        reference.of_metres(checked.amplitude),
+    let (unit, verdict) = (
+        scene.units().reference.symbol,
         named(&checked.verdict.to_string(), scene),
     );
-    text += &format!("At {symbol} = {amplitude:.2e} {}: {verdict}\n", reference.symbol);
+    text += &format!("At {symbol} = {:.2e} {unit}: {verdict}\n", checked.amplitude);
     if checked.is_raised() {
         text += &format!(
             "The noise of the sensors needed {:.0} % of the drive; the check took {:.0} periods.\n",

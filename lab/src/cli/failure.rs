@@ -155,7 +155,7 @@ impl From<ExperimentError> for Failure {
             ExperimentError::SteadyLost { .. } => {
                 "; set backbone.C_to (over the half-width) nearer to the former, or more backbone.points"
             }
-            ExperimentError::NoDrive => ": set excitation.G or excitation.E above 0",
+            ExperimentError::NoDrive => ": set G, E or F of [excitation] above 0",
             _ => "",
         };
         Self::new(code, format!("{error}{advice}"))

@@ -18,15 +18,16 @@ use vines::{ArgumentError, cells};
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
 use super::output::{Results, Written, output, progress_bar, writable};
-use super::points::{Column, Measurement, Source, measurement};
+use super::points::{Column, Measurement, Reading, Source, measurement};
 use super::summary::with_unit;
 
 const HELP: &str = "\
 A point has the frequency of phase resonance f, the amplitude A of the response and the amplitude E of the base, each with its standard
 uncertainty: a locked point of `vines identify` (identification.json), the points of `vines backbone` (tracked.csv), or a table of yours
-with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Points that are not settled (columns settled and
-reached), or whose motion is not nonlinear and symmetric (motion), are left out. The column phase_target_deg is the phase of the response
-relative to the base, degrees, at which a point was measured; without it, it is the scene's controller.phase_target.
+with the columns f_Hz, A_m, E_m, u_f_Hz, u_A_m and u_E_m, or others that --column names. Where a force drives, E is its amplitude in N,
+with the columns F_N and u_F_N. Points that are not settled (columns settled and reached), or whose motion is not nonlinear and symmetric
+(motion), are left out. The column phase_target_deg is the phase of the response relative to the base, degrees, at which a point was
+measured; without it, it is the scene's controller.phase_target.
 
 A recording has two channels over time, the response and the base. Delimiter, decimal mark, names and units are found;
 a file of `vines` needs no options. `python -m vines fit` has the same options, and reads other tables and formats. A channel is NAME or NAME:UNIT, with a name or a number of a column, and a unit (mm, µm, mm/s,
@@ -182,8 +183,13 @@ fn gathered(
     };
     let (mut skipped, mut notes) = (0, Vec::new());
     for path in &arguments.points {
-        let (phase, source) = (scene.definition().phase, read(path).map_err(Failure::input)?);
-        match measurement(path, source, (&arguments.column, phase), &selection).map_err(Failure::input)? {
+        let reading = Reading {
+            columns: &arguments.column,
+            phase: scene.definition().phase,
+            units: scene.units(),
+        };
+        let source = read(path).map_err(Failure::input)?;
+        match measurement(path, source, reading, &selection).map_err(Failure::input)? {
             Measurement::Points(points, left_out, linear) => {
                 measured.points.extend(points);
                 skipped += left_out;

@@ -91,7 +91,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         );
     }
     // A rig that reports its impacts is a simulation of the scene.
-    let lock = vec![(&identification.lock.at).into()];
+    let lock = vec![identification.lock.at.measured(&scene.units())];
     if !reports_impacts && let Some(found) = contradiction(&scene, lock) {
         text += &format!(
             "\n{}: track the backbone with `vines backbone`, and run `vines fit`\n",

@@ -13,7 +13,7 @@ use vines::fit::{Contents, MeasuredPoint, Recording, RecordingError, Selection, 
 use vines::identification::Regime;
 use vines::linear::MeasuredLinear;
 use vines::numerics::Estimate;
-use vines::scene::{Measurand, Name, phase_target};
+use vines::scene::{Measurand, Name, Units, phase_target};
 
 /// Quantities of a point, the columns that have them, and their units.
 const COLUMNS: [(&str, &str, &str); 6] = [
@@ -25,10 +25,13 @@ const COLUMNS: [(&str, &str, &str); 6] = [
     ("u_E", "u_E_m", "m"),
 ];
 
-/// What a column measures, and SI units per unit. Amplitudes may be those of velocities and accelerations.
+/// Columns of a drive by force.
+const FORCE: [(&str, &str, &str); 2] = [("E", "F_N", "N"), ("u_E", "u_F_N", "N")];
+
+/// What a column measures, and SI units per unit. Amplitudes may be those of velocities and accelerations; of a force there is no measurand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ColumnUnit {
-    measurand: Measurand,
+    measurand: Option<Measurand>,
     factor: f64,
 }
 
@@ -36,19 +39,21 @@ impl ColumnUnit {
     fn of(quantity: &str, column: &str, unit: &str) -> Result<Self, ArgumentError> {
         let Name { factor, si, .. } = Name::with_unit(column, unit)?;
         let si = si.unwrap_or_default();
-        let is_frequency = quantity.trim_start_matches("u_") == "f";
-        let measurand = match Measurand::of_unit(si).filter(|_| !is_frequency) {
-            None if is_frequency && si == "rad/s" => Measurand::Displacement,
-            None => {
-                let allowed = if is_frequency {
-                    "Hz, rad/s or 1/min"
-                } else {
-                    "a length (m, mm, µm), a velocity (m/s, mm/s) or an acceleration (m/s², g)"
-                };
-                return Err(format!("{column}: {quantity} in {unit} is not possible; allowed is {allowed}").into());
-            }
-            Some(measurand) => measurand,
+        let measurand = Measurand::of_unit(si);
+        let of = quantity.trim_start_matches("u_");
+        let is_possible = match of {
+            "f" => si == "rad/s",
+            "E" => measurand.is_some() || si == "N",
+            _ => measurand.is_some(),
         };
+        if !is_possible {
+            let allowed = match of {
+                "f" => "Hz, rad/s or 1/min",
+                "E" => "a length (m, mm, µm), a velocity (m/s, mm/s), an acceleration (m/s², g) or a force (N)",
+                _ => "a length (m, mm, µm), a velocity (m/s, mm/s) or an acceleration (m/s², g)",
+            };
+            return Err(format!("{column}: {quantity} in {unit} is not possible; allowed is {allowed}").into());
+        }
         Ok(Self { measurand, factor })
     }
 }
@@ -130,34 +135,40 @@ pub(super) fn plain(path: &Path) -> Result<Source, ArgumentError> {
     table.map(Source::Channels).map_err(|error| python(&error.to_string()))
 }
 
-/// What is measured in a file: points if it has one of their columns or `columns` names some, otherwise a recording. `phase`, rad: at which points
-/// were measured that do not say it.
+/// How the points of a file are read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reading<'a> {
+    /// Columns that the user names.
+    pub columns: &'a [Column],
+    /// At which phase points were measured that do not say it, rad.
+    pub phase: f64,
+    /// The units of the channels.
+    pub units: Units,
+}
+
+/// What is measured in a file: points if it has one of their columns or `reading` names some, otherwise a recording.
 ///
 /// # Errors
 /// A file without one of the columns, or with a value that is not a number.
 pub(super) fn measurement(
     path: &Path,
     source: Source,
-    (columns, phase): (&[Column], f64),
+    reading: Reading<'_>,
     selection: &Selection,
 ) -> Result<Measurement, ArgumentError> {
     let refused = |error: RecordingError| ArgumentError::from(error.to_string());
     let contents = match source {
         Source::Channels(contents) => contents,
-        Source::Json(bytes) => return of_json(path, &bytes, (columns, phase)),
+        Source::Json(bytes) => return of_json(path, &bytes, reading),
     };
     let is_named = selection.response.is_some() || selection.drive.is_some();
-    let has_points = !columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| contents.unit(name).is_some());
+    let has_points = !reading.columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| contents.unit(name).is_some());
     if has_points && !is_named {
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
         let rows: Vec<Row> = contents.rows().map(row).collect();
-        return points(
-            path,
-            &rows,
-            (columns, phase),
-            rows.first().and_then(linear_of),
-            |column| contents.unit(column).unwrap_or_default(),
-        );
+        return points(path, &rows, reading, rows.first().and_then(linear_of), |column| {
+            contents.unit(column).unwrap_or_default()
+        });
     }
     if !is_named && contents.unit("response").is_none() {
         let names = COLUMNS.map(|(_, name, _)| name).join(", ");
@@ -172,7 +183,7 @@ pub(super) fn measurement(
 }
 
 /// Points in what `vines identify`, `backbone` and `check` write as JSON.
-fn of_json(path: &Path, bytes: &[u8], columns: (&[Column], f64)) -> Result<Measurement, ArgumentError> {
+fn of_json(path: &Path, bytes: &[u8], reading: Reading<'_>) -> Result<Measurement, ArgumentError> {
     let file = path.display();
     let value: Value = serde_json::from_slice(bytes).map_err(|error| cannot_read(path, error))?;
     let linear = value
@@ -185,7 +196,7 @@ fn of_json(path: &Path, bytes: &[u8], columns: (&[Column], f64)) -> Result<Measu
              the JSON of `vines check`, or a table (CSV)"
         )
     })?;
-    points(path, &rows, columns, linear, |_| "")
+    points(path, &rows, reading, linear, |_| "")
 }
 
 /// Formats that the Python package reads.
@@ -200,18 +211,18 @@ fn not_a_number(path: &Path, row: usize, column: &str, value: &str) -> ArgumentE
     format!("{file}, row {row}: {column} = `{value}` is not a finite number").into()
 }
 
-/// The points of a file, and the number of points that are left out. `phase`, rad: of points without a column of their phase target.
+/// The points of a file, and the number of points that are left out.
 fn points<'a>(
     path: &Path,
     rows: &[Row],
-    (columns, phase): (&[Column], f64),
+    reading: Reading<'_>,
     linear: Option<MeasuredLinear>,
     stated: impl Fn(&str) -> &'a str,
 ) -> Result<Measurement, ArgumentError> {
     let mut kept = Vec::new();
     for (n, row) in rows.iter().enumerate() {
         if is_symmetric(path, n + 1, row)? {
-            kept.push(point(path, n + 1, row, columns, phase, &stated)?);
+            kept.push(point(path, n + 1, row, reading, &stated)?);
         }
     }
     let left_out = rows.len() - kept.len();
@@ -300,12 +311,14 @@ fn point<'a>(
     path: &Path,
     number: usize,
     row: &Row,
-    columns: &[Column],
-    phase: f64,
+    Reading { columns, phase, units }: Reading<'_>,
     stated: &impl Fn(&str) -> &'a str,
 ) -> Result<MeasuredPoint, ArgumentError> {
+    let is_forced = units.reference.symbol == "N";
     // The value in SI units, and how often a displacement is differentiated.
     let value = |(quantity, column, unit): (&str, &str, &str)| {
+        let of_force = FORCE.into_iter().find(|(of, ..)| is_forced && *of == quantity);
+        let (column, unit) = of_force.map_or((column, unit), |(_, column, unit)| (column, unit));
         let named = columns.iter().rfind(|column| column.quantity == quantity);
         let column = named.map_or(column, |named| &named.name);
         let unit = match (named, stated(column)) {
@@ -313,6 +326,16 @@ fn point<'a>(
             (None, "") => ColumnUnit::of(quantity, column, unit)?,
             (None, stated) => ColumnUnit::of(quantity, column, stated)?,
         };
+        if quantity.ends_with('E') && unit.measurand.is_none() != is_forced {
+            let (driven, needs) = if is_forced {
+                ("a force", "N")
+            } else {
+                ("the motion of a base", "no N")
+            };
+            return Err(
+                format!("{column}: the scene is driven by {driven}, whose amplitude {quantity} is in {needs}").into(),
+            );
+        }
         let text = row.get(column).ok_or_else(|| {
             let names: Vec<&str> = row.keys().map(String::as_str).collect();
             format!(
@@ -325,7 +348,7 @@ fn point<'a>(
         let number_of = text.parse::<f64>().ok().filter(|value| value.is_finite());
         let refused = || not_a_number(path, number, column, text);
         let value = unit.factor * number_of.ok_or_else(refused)?;
-        Ok::<_, ArgumentError>((value, unit.measurand.order()))
+        Ok::<_, ArgumentError>((value, unit.measurand.map_or(0, Measurand::order)))
     };
     let estimate = |n: usize, omega: f64| {
         let displacement = |(value, order): (f64, i32)| value / omega.powi(order);
@@ -346,5 +369,5 @@ fn point<'a>(
             value.to_radians()
         }
     };
-    Ok(MeasuredPoint { omega, response, drive, phase })
+    Ok(MeasuredPoint { omega, response, drive, phase }.in_metres(&units))
 }

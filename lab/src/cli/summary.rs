@@ -9,7 +9,7 @@ use vines::identification::{DecayEnd, Friction, Lock, Regime, ResonancePoint, To
 use vines::numerics::SIGNIFICANT;
 use vines::orbit::Orbit;
 use vines::regime_map::Map;
-use vines::scene::{Definition, Dimensionless, Scene, Unit, Units};
+use vines::scene::{Definition, Dimensionless, Scene, Units};
 use vines::table::{Table, lines, note, with_uncertainty};
 
 /// The dimensionless numbers of a scene, in one line.
@@ -27,7 +27,7 @@ fn rig(p: &Dimensionless) -> String {
 }
 
 /// What response and drive of a scene are called, with their units.
-pub(super) fn channels(scene: &Scene) -> [(String, Unit); 2] {
+pub(super) fn channels(scene: &Scene) -> [(String, &'static str); 2] {
     let Units { reference, response, .. } = scene.units();
     let [of_response, of_drive] = match &scene.structure {
         None => ["response".into(), "base".into()],
@@ -39,19 +39,16 @@ pub(super) fn channels(scene: &Scene) -> [(String, Unit); 2] {
             [format!("response at {}", point(structure.sensor)), drive]
         }
     };
-    [(of_response, response), (of_drive, reference)]
+    [(of_response, response.symbol), (of_drive, reference.symbol)]
 }
 
 /// Frequency in hertz, amplitude of response and drive in their units, with their uncertainties.
-fn values(units: &Units, at: &ResonancePoint) -> [String; 3] {
-    let value = |metres: [f64; 2], unit: Unit| {
-        let [value, u] = metres.map(|metres| unit.of_metres(metres));
-        format!("{value:.5e} ± {u:.1e}")
-    };
+fn values(at: &ResonancePoint) -> [String; 3] {
+    let (drive, value) = (at.drive(), |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}"));
     [
         with_uncertainty(at.f_hz, at.u_f_hz),
-        value([at.a_m, at.u_a_m], units.response),
-        value([at.e_m, at.u_e_m], units.reference),
+        value(at.a_m, at.u_a_m),
+        value(drive.value, drive.uncertainty),
     ]
 }
 
@@ -164,9 +161,8 @@ const SYMBOLS: &str = "  sigma: detuning (omega/omega0 - 1)/epsilon; C: amplitud
 /// An identification: the locked point beside theory and exact orbit, then the decay. Of a rig that does not report impacts, only what is measured.
 pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let (lock, at) = (&result.lock, &result.lock.at);
-    let units = scene.units();
-    let [hertz, response, drive] = values(&units, at);
-    let [(of_response, m), (of_drive, unit)] = channels(scene).map(|(name, unit)| (name, unit.symbol));
+    let [hertz, response, drive] = values(at);
+    let [(of_response, m), (of_drive, unit)] = channels(scene);
     let measured = format!("Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n");
     let locked = |motion: String| {
         format!(
@@ -178,10 +174,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         )
     };
     if lock.regime_by_impacts.is_none() {
-        let (locked, decay) = (
-            locked(lock.regime.motion().into()),
-            decay_at_sensor(result, units.response),
-        );
+        let (locked, decay) = (locked(lock.regime.motion().into()), decay_at_sensor(result));
         let notes = [
             Some(stability(lock)),
             lock.clipped_percent.map(clipped),
@@ -286,18 +279,17 @@ fn tone(tone: Tone) -> String {
 }
 
 /// The decay, without a particle.
-fn decay_at_sensor(result: &Comparison, unit: Unit) -> String {
+fn decay_at_sensor(result: &Comparison) -> String {
     let (first, last) = match &result.decay[..] {
         [] => return "Free decay: no points".into(),
         points => (points[0].point, points[points.len() - 1].point),
     };
-    let m = unit.symbol;
     format!(
-        "Free decay: {} points from {:.4e} {m} at {:.5} Hz down to {:.4e} {m} at {:.5} Hz",
+        "Free decay: {} points from {:.4e} m at {:.5} Hz down to {:.4e} m at {:.5} Hz",
         result.decay.len(),
-        unit.of_metres(first.a_m),
+        first.a_m,
         first.f_hz,
-        unit.of_metres(last.a_m),
+        last.a_m,
         last.f_hz
     )
 }
@@ -315,38 +307,38 @@ pub(super) fn structure(scene: &Scene, reports_impacts: bool) -> String {
     let masses = structure.mass_loading();
     let masses = masses.map_or(String::new(), |text| format!("{text}; all modes here are with them\n"));
     let numbers = match reports_impacts {
-        true => "epsilon, lambda, sigma, C and G are those of mode",
-        false => "the results in files are those of mode",
+        true => "epsilon, lambda, sigma, C and G",
+        false => "sigma, C and G in files",
     };
+    let (Units { response, reference, .. }, d) = (structure.units(), scene.dimensionless());
     format!(
-        "{masses}{numbers} {}, as are A_m and E_m in files: {:.5e} m and {:.5e} m per unit of response and drive\n",
+        "{masses}{numbers} are those of mode {}: C = 1 is a response of {:.5e}, and G = 1 a drive of {:.5e}\n",
         structure.driven + 1,
-        scene.units().response.in_metres(1.0),
-        scene.units().reference.in_metres(1.0)
+        response.quantity(d.b),
+        reference.quantity(d.amplitude(1.0))
     )
 }
 
 /// In what the result is not the requested one.
 pub(super) fn not_as_asked(result: &Comparison, scene: &Scene) -> impl Iterator<Item = String> {
     let lock = &result.lock;
-    let [_, (of_drive, unit)] = channels(scene);
-    let symbol = unit.symbol;
-    let ratio = lock.at.e_m / lock.requested_e_m;
+    let [_, (of_drive, symbol)] = channels(scene);
+    let (drive, requested) = (lock.at.drive(), lock.requested());
     let another = (!lock.at_requested_drive).then(|| {
         format!(
-            "the result is at another drive than the requested one: {of_drive} {:.5e} ± {:.1e} {symbol}, {ratio:.4} times the requested {:.5e} {symbol}",
-            unit.of_metres(lock.at.e_m),
-            unit.of_metres(lock.at.u_e_m),
-            unit.of_metres(lock.requested_e_m)
+            "the result is at another drive than the requested one: {of_drive} {:.5e} ± {:.1e} {symbol}, {:.4} times the requested {requested:.5e} \
+             {symbol}",
+            drive.value,
+            drive.uncertainty,
+            drive.value / requested
         )
     });
-    let moves = result.base_after_release.map(|[base, u]| {
+    let after_release = result.base_after_release.or(result.force_after_release);
+    let moves = after_release.map(|[value, u]| {
         format!(
-            "there is no free decay: the drive was released, but the {of_drive} goes on with the drive's frequency, with at least {:.2e} ± {:.1e} {symbol}, \
-             {:.1e} times the requested drive",
-            unit.of_metres(base),
-            unit.of_metres(u),
-            base / lock.requested_e_m
+            "there is no free decay: the drive was released, but the {of_drive} goes on with the drive's frequency, with at least {value:.2e} ± {u:.1e} \
+             {symbol}, {:.1e} times the requested drive",
+            value / requested
         )
     });
     [another, moves].into_iter().flatten()
@@ -486,20 +478,18 @@ fn remarks(point: &LevelPoint, mut motion: String, scene: &Scene) -> String {
 
 /// The measured points as a table, without a particle.
 fn measured(result: &TrackedComparison, scene: &Scene) -> String {
-    let units = scene.units();
     let rows = result.points.iter().map(|TrackedPoint { point, .. }| {
         let motion = remarks(point, point.regime.motion().into(), scene);
-        [&values(&units, &point.at)[..], &effort(point), &[motion]].concat()
+        [&values(&point.at)[..], &effort(point), &[motion]].concat()
     });
-    let [response, drive] = channels(scene).map(|(name, unit)| format!("{name}, {}", unit.symbol));
+    let [response, drive] = channels(scene).map(|(name, unit)| format!("{name}, {unit}"));
     let headings = format!("frequency, Hz | {response} | {drive} | off target | periods | averaged | motion");
     Table::new(&headings).rows(rows).text()
 }
 
 /// Harmonics of what a shaker drives the structure with, as a table; empty without a shaker.
 fn drive_harmonics(result: &TrackedComparison, scene: &Scene) -> String {
-    let [(response, unit), (drive, _)] = channels(scene);
-    let m = unit.symbol;
+    let [(response, m), (drive, _)] = channels(scene);
     let rows = result.points.iter().filter_map(|TrackedPoint { point, .. }| {
         let harmonics = point
             .drive_harmonics?
@@ -507,7 +497,7 @@ fn drive_harmonics(result: &TrackedComparison, scene: &Scene) -> String {
         let clipped = point.clipped_percent.map(|share| format!("{share:.1}"));
         let level = match result.reports_impacts() {
             true => format!("{:.4}", point.at.c),
-            false => format!("{:.4e}", unit.of_metres(point.at.a_m)),
+            false => format!("{:.4e}", point.at.a_m),
         };
         Some([level].into_iter().chain(harmonics).chain(clipped).collect::<Vec<_>>())
     });

@@ -336,6 +336,8 @@ fn host(scene: &Scene, structure: &Structure) -> Value {
     };
     json!({
         "drive": drive,
+        // The half-width as a response at the sensor, mm.
+        "gap": 1e3 * structure.units().response.of_metres(scene.plant.half_width),
         "drop_out": structure.shaker.as_ref().map(|shaker| json!({ "title": title, "unit": unit, "points": points(shaker) })),
     })
 }

@@ -219,10 +219,11 @@ pub fn fitted(found: &Found, scene: &Scene) -> Figure {
     let residuals = found.data.apart(fit);
     let p = scene.dimensionless();
     let used: Vec<(&MeasuredPoint, &[f64; 3])> = points.iter().zip(&residuals).collect();
-    let place = |point: &MeasuredPoint| (1e3 * point.response.value, point.omega.value / TAU);
+    let millimetres = |metres: f64| 1e3 * scene.units().response.of_metres(metres);
+    let place = |point: &MeasuredPoint| (millimetres(point.response.value), point.omega.value / TAU);
     let at = |measured: Estimate, over_u: f64| measured.value + over_u * measured.uncertainty;
     let model = used.iter().map(|(point, residual)| {
-        let amplitude = 1e3 * at(point.response, residual[0]);
+        let amplitude = millimetres(at(point.response, residual[0]));
         (amplitude, at(point.omega, residual[1]) / TAU)
     });
     let mut model: Vec<Place> = model.collect();
@@ -234,7 +235,7 @@ pub fn fitted(found: &Found, scene: &Scene) -> Figure {
     let expected = exact
         .places()
         .iter()
-        .map(|[c, sigma, ..]| (1e3 * c * p.b, (p.omega0 + p.omega_change(*sigma)) / TAU));
+        .map(|[c, sigma, ..]| (millimetres(c * p.b), (p.omega0 + p.omega_change(*sigma)) / TAU));
     let expected: Vec<Place> = expected
         .filter(|(amplitude, _)| (x.0..x.1).contains(amplitude))
         .collect();

@@ -112,7 +112,7 @@ fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
                     reached,motion,regime_by_impacts,tone_Hz,tone_share,distance,sigma_less_exact,G_less_exact";
     let is_forced = result.points.iter().any(|compared| compared.point.at.f_n.is_some());
     let headings = match is_forced {
-        true => headings.replace("u_E_m,", "u_E_m,F_N,u_F_N,"),
+        true => headings.replace("E_m,", "F_N,"),
         false => headings.into(),
     };
     let mut headings = format!("{headings},{}", MeasuredLinear::COLUMNS.join(","));

@@ -270,6 +270,10 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
     for (column, words) in [
         ("A=A_m:s", "A in s is not possible; allowed is a length"),
         ("A=A_m:N", "A in N is not possible"),
+        (
+            "E=E_m:N",
+            "the scene is driven by the motion of a base, whose amplitude E is in no N",
+        ),
         ("f=f_Hz:mm", "f in mm is not possible; allowed is Hz, rad/s or 1/min"),
     ] {
         fails(&format!("fit {out}/tracked.csv --column {column}"), 2, words);
@@ -297,6 +301,30 @@ fn a_fit_of_tracked_points_corrects_a_wrong_scene_and_writes_it() {
         let other = r(&format!("fit {file}{columns} --json"));
         assert!((one / other - 1.0).abs() < 1e-7, "{one} {other}");
     }
+}
+
+#[test]
+fn points_of_a_force_test_have_newtons_and_metres_at_the_sensor_in_their_file_from_which_a_fit_finds_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, scene) = (
+        folder.path().display(),
+        format!("{}/../scenes/frame.toml", env!("CARGO_MANIFEST_DIR")),
+    );
+    let levels = "--set backbone.C_to=0.4 --set backbone.points=6";
+    let tracked = vines(&format!(
+        "backbone --scene {scene} --set resonance.sensor_quantity=acceleration {levels} --out {out}"
+    ));
+    assert!(tracked.status.success(), "{tracked:?}");
+    let table = fs::read_to_string(folder.path().join("tracked.csv")).unwrap();
+    assert!(table.starts_with("f_Hz,A_m,F_N,u_f_Hz,u_A_m,u_F_N,sigma,"), "{table}");
+    let fitted = json(&format!("fit {out}/tracked.csv --scene {scene} --json"));
+    assert_eq!(fitted["describes"], true, "{fitted}");
+    for parameter in fitted["parameters"].as_array().unwrap() {
+        let [value, u, expected] = ["value", "uncertainty", "expected"].map(|name| parameter[name].as_f64().unwrap());
+        assert!((value - expected).abs() < u, "{parameter}");
+    }
+    let column = format!("fit {out}/tracked.csv --scene {scene} --column E=F_N:mm");
+    fails(&column, 2, "the scene is driven by a force, whose amplitude E is in N");
 }
 
 #[test]

@@ -187,6 +187,8 @@ fn the_page_of_a_shaker_has_the_exact_backbone_of_all_modes_and_the_drop_out_of_
         (&host["drive"], &host["drop_out"]["unit"]),
         (&"force".into(), &"N".into())
     );
+    // The sensor is at the cavity.
+    assert!((host["gap"].as_f64().unwrap() - 10.0).abs() < 1e-12);
     let points: Vec<[f64; 2]> = serde_json::from_value(host["drop_out"]["points"].clone()).unwrap();
     let [hertz, least] = *points.iter().min_by(|one, other| one[1].total_cmp(&other[1])).unwrap();
     assert!((hertz / 8.815 - 1.0).abs() < 0.005, "{hertz} Hz");

@@ -313,10 +313,10 @@ pub enum Refusal {
     /// 4: the version of the server.
     #[error("it has version {0} of the protocol, this program has version {VERSION}: use the same release of both")]
     Version(u16),
-    /// 5: a value, rad/s or m, that is not finite or above its limit: frequency, amplitude, displacement.
+    /// 5: a value, rad/s or the unit of the drive, that is not finite or above its limit: frequency, amplitude, displacement.
     #[error(
         "the {} of the drive is {value:e}, allowed is up to {limit:e}: half the sample rate, and the largest amplitude of the rig",
-        ["frequency, rad/s,", "amplitude, m,", "displacement, m,"].get(*index).unwrap_or(&"value")
+        ["frequency (rad/s)", "amplitude (m, N or V, as it drives)", "present value (m, N or V, as it drives)"].get(*index).unwrap_or(&"value")
     )]
     Drive { index: usize, value: f64, limit: f64 },
     /// 6

@@ -420,7 +420,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         *confirmed = if criterion.is_met(&estimate) { *confirmed + 1 } else { 0 };
         let is_long = self.cycles.len() >= LONGEST_SETTLING;
         if let Some(why) = estimate.unsteady.filter(|_| is_long && *confirmed == 0) {
-            let (periods, response) = (self.cycles.len(), leg.response);
+            let (periods, response) = (self.cycles.len(), self.target.units.response.quantity(leg.response));
             return Err(ExperimentError::NotSteady { periods, response, why });
         }
         let settled = is_long || *confirmed >= CONFIRMED;
@@ -568,7 +568,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             requested: d.g,
             lost: self.lost,
             unsettled: self.unsettled,
-            silent: is_silent.then_some(d.b),
+            silent: is_silent.then(|| self.target.units.response.of_metres(d.b)),
         };
         ExperimentError::NotReached { periods: self.bench.periods, found: found.into() }
     }

@@ -15,7 +15,7 @@ use vines_model::numerics::{Estimate, mean, range};
 use vines_model::{Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
 use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, ParticleState};
-use vines_scene::scene::Scene;
+use vines_scene::scene::{Scene, Units};
 
 use super::decimals;
 use crate::identification::{Harmonic, Line, PHASE_RANGE, harmonic};
@@ -334,7 +334,7 @@ impl Recording {
             .time
             .iter_mut()
             .for_each(|time| *time += margin as f64 * sample_time);
-        let stretches = Stretch::all(&found);
+        let stretches = Stretch::all(&found, &knowledge.target.units);
         let periods = found.time.iter().zip(&found.amplitude).zip(&found.used);
         let periods = periods
             .filter(|(_, used)| **used)
@@ -492,7 +492,7 @@ pub(super) fn rough(scene: &Scene) -> IdealRig {
 pub struct Stretch {
     /// Its begin and end, s since the first sample.
     pub seconds: [f64; 2],
-    /// Smallest and largest amplitude of the response, m.
+    /// Smallest and largest amplitude of the response, displacements at the sensor, m.
     pub response_m: [f64; 2],
     /// The motion, of [`MOTIONS`].
     pub motion: &'static str,
@@ -500,22 +500,19 @@ pub struct Stretch {
 
 impl Stretch {
     /// Neighbouring windows with the same motion are one.
-    fn all(found: &Identified) -> Vec<Self> {
+    fn all(found: &Identified, units: &Units) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         for (window, motion) in &found.motions {
-            let [from, to] = window.periods;
+            let ([from, to], amplitude) = (window.periods, units.response.of_metres(window.amplitude));
             let seconds = [found.time[from], found.time[to - 1]];
             match all.last_mut() {
                 Some(last) if last.motion == MOTIONS[*motion] => {
                     last.seconds[1] = seconds[1];
-                    last.response_m = [
-                        last.response_m[0].min(window.amplitude),
-                        last.response_m[1].max(window.amplitude),
-                    ];
+                    last.response_m = [last.response_m[0].min(amplitude), last.response_m[1].max(amplitude)];
                 }
                 _ => all.push(Self {
                     seconds,
-                    response_m: [window.amplitude; 2],
+                    response_m: [amplitude; 2],
                     motion: MOTIONS[*motion],
                 }),
             }

@@ -20,7 +20,7 @@ pub struct FreeDecayPoint {
     /// Frequency, Hz.
     #[serde(rename = "f_Hz")]
     pub f_hz: f64,
-    /// Amplitude of the fundamental of the response, m.
+    /// Amplitude of the fundamental of the response: its displacement at the sensor, m.
     #[serde(rename = "A_m")]
     pub a_m: f64,
     /// Standard uncertainty of the frequency, Hz.
@@ -222,9 +222,9 @@ impl SlidingFit {
         FreeDecayPoint {
             t_s: self.time,
             f_hz: omega / TAU,
-            a_m: amplitude,
+            a_m: knowledge.target.units.response.of_metres(amplitude),
             u_f_hz: u_omega / TAU,
-            u_a_m: u_amplitude,
+            u_a_m: knowledge.target.units.response.of_metres(u_amplitude),
             tau: d.omega0 * self.time,
             c: amplitude / d.b,
             // The mean is the value at the middle of the straight line that fits best.

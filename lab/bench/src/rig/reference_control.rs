@@ -138,9 +138,9 @@ impl ReferenceControl {
             return Err(RigError::AmplifierLimit { times: self.times });
         }
         if self.contradicted > longest {
-            let unit = self.target.units.reference;
-            let [expected, read] = [expected, read].map(|value| unit.of_metres(value.norm()));
-            let unit = unit.symbol;
+            let unit = self.target.unit(1);
+            let [expected, read] =
+                [expected, read].map(|value| self.target.quantity(1, (value / displacement).norm()).value);
             return Err(RigError::PathContradicted { expected, read, periods: longest / TAU, unit });
         }
         if amplitude == 0.0 {

@@ -175,7 +175,7 @@ fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
                     assert!(!found.lock.at_requested_drive, "{turned} {times}");
                     format!(
                         "{:.3} times the requested",
-                        found.lock.at.e_m / found.lock.requested_e_m
+                        found.lock.at.drive().value / found.lock.requested()
                     )
                 }
             },

@@ -11,6 +11,7 @@ mod measuring;
 mod scenes;
 mod shakers;
 mod structures;
+mod units;
 
 use phase_lock::Config;
 use vines_bench::backbone::{Tracked, track};

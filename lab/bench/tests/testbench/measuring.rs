@@ -382,8 +382,8 @@ fn falsified(settings: &[&str], wrong: &[&str]) -> (SensorsOnly, Scene) {
 
 /// The values in SI units, with all digits.
 fn digits(at: &ResonancePoint) -> String {
-    let values = [at.f_hz, at.a_m, at.e_m, at.phase_error_deg];
-    let uncertainties = [at.u_f_hz, at.u_a_m, at.u_e_m, at.u_phase_deg];
+    let values = [at.f_hz, at.a_m, at.drive().value, at.phase_error_deg];
+    let uncertainties = [at.u_f_hz, at.u_a_m, at.drive().uncertainty, at.u_phase_deg];
     format!("{values:?} {uncertainties:?}")
 }
 

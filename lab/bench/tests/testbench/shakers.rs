@@ -99,8 +99,10 @@ fn a_lock_behind_a_shaker_states_its_force_in_newtons_and_its_command_in_volts()
     let lock = identified(&scene).unwrap().lock;
     let unit = scene.units().reference;
     let (force, u_force) = (lock.at.f_n.unwrap(), lock.at.u_f_n.unwrap());
-    assert!((unit.in_metres(force) / lock.at.e_m - 1.0).abs() < 1e-12);
-    assert!((unit.in_metres(u_force) / lock.at.u_e_m - 1.0).abs() < 1e-12);
+    let d = scene.dimensionless();
+    assert!((unit.in_metres(force) / d.amplitude(lock.at.g) - 1.0).abs() < 1e-12);
+    assert!((unit.in_metres(u_force) / d.amplitude(lock.at.u_g) - 1.0).abs() < 1e-12);
+    assert!(lock.at.e_m.is_none() && lock.at.u_e_m.is_none());
     // The exact orbits of structure and shaker state both.
     let orbits = Survey::of(&scene).unwrap().orbits;
     let apart = |orbit: &StructureOrbit| (orbit.omega / (TAU * lock.at.f_hz) - 1.0).abs();
@@ -150,10 +152,11 @@ fn tracked_points_behind_a_shaker_belong_to_their_scene_and_not_to_a_wrong_one()
     for n in [1, 2] {
         let levels = "[start] -> [backbone]\npoints = 8\nC_from = 0.6\nC_to = 0.25\n\n[start]";
         let scene = preset(n, levels).unwrap();
-        let points: Vec<_> = tracked_of(&scene)
+        let found = tracked_of(&scene);
+        let points: Vec<_> = found
             .points
             .iter()
-            .map(|point| (&point.at).into())
+            .map(|point| point.at.measured(&scene.units()))
             .collect();
         assert!(contradiction(&scene, points.clone()).is_none(), "preset {n}");
         let mut wrong = scene.clone();
@@ -179,7 +182,9 @@ fn distance_of_lock(scene: &Scene) -> (f64, f64) {
     let lock = identified(scene).unwrap().lock;
     let at = lock.at;
     // The force is known to its uncertainty, which moves the orbit.
-    let [orbits, moved] = [at.e_m, at.e_m + at.u_e_m].map(|amplitude| {
+    let d = scene.dimensionless();
+    let [orbits, moved] = [at.g, at.g + at.u_g].map(|g| {
+        let amplitude = d.amplitude(g);
         let measured = Scene { amplitude, ..scene.clone() };
         phase_resonant(&measured, &measured.dimensionless())
     });

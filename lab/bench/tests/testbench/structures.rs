@@ -86,7 +86,7 @@ fn a_force_through_much_damping_is_checked_and_its_points_belong_to_the_scene() 
         let points: Vec<MeasuredPoint> = points
             .iter()
             .filter(|one| one.settled)
-            .map(|one| (&one.at).into())
+            .map(|one| one.at.measured(&scene.units()))
             .collect();
         assert!(points.len() > 20, "{}", points.len());
         assert!(contradiction(&points, scene.definition(), &scene.plant).is_none());
