@@ -6,13 +6,12 @@ The simulator is a fourth-order Runge-Kutta method with impacts located by bisec
 plant of vines. The rig is that of the tutorial "From a recording to a scene". Its base goes through levels of drive
 and frequency near phase resonance. Both channels pass an anti-alias filter (Butterworth, fourth order, 300 Hz); an
 impact excites the filter of an accelerometer as an impulse. Noise is 50 dB below each channel. Rows: what the channels
-measure, what is wrong with them, and the seed of the noise. Columns: errors of the parameters, and their standard
-uncertainties u, over the u that the tutorial states; `periods`: of the recording that the plant follows, 0 where this
-fit is rejected and the points alone are fitted. It needs a release build of `vines`.
+measure, what is wrong with them, and the seed of the noise. Columns: seconds of 1:1 motion, hypotheses that are
+possible, p of the best one, and of the ideal cavity the errors of the parameters over their standard uncertainties u,
+and these over the value. It needs a release build of `vines`.
 """
 
 import json
-import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -24,10 +23,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).parent.parent
 VINES = ROOT / "target/release/vines"
 HIDDEN = {"M": 3.807, "k": 11.68e3, "c": 2.9, "m": 0.035, "b": 0.0095, "r": 0.57}
-# Standard uncertainties that the tutorial states: f0 (Hz), zeta, r, b (m), epsilon.
-PAGE = (ROOT / "docs/from-a-recording.md").read_text()
-STATED = dict(re.findall(r"^  (\w+) +[\d.]+ ± ([\d.]+)", PAGE, re.MULTILINE))
-TUTORIAL = {symbol: float(STATED[symbol]) for symbol in ("f0", "zeta", "r", "b", "epsilon")}
+PARAMETERS = ("f0", "zeta", "r", "b", "epsilon")
 RATE = 1000.0
 GRAVITY = 9.80665
 CUT_OFF = 2 * np.pi * 300.0
@@ -220,18 +216,21 @@ def main() -> None:
                 print(rows[-1])
                 continue
             found = json.loads(done.stdout)
-            parameters = {one["symbol"]: one for one in found["parameters"]}
+            ideal = next(one for one in found["hypotheses"] if one["hypothesis"] == "ideal cavity")
+            parameters = {one["symbol"]: one for one in ideal["parameters"]}
             ratios = [
-                f"{(parameters[s]['value'] - truth[s]) / u:.2f},{parameters[s]['uncertainty'] / u:.2f}"
-                for s, u in TUTORIAL.items()
+                f"{(one['value'] - truth[symbol]) / one['uncertainty']:.2f},{one['uncertainty'] / one['value']:.1e}"
+                for symbol in PARAMETERS
+                for one in [parameters[symbol]]
             ]
-            p, periods = found["p_value"], found.get("followed_periods", 0)
-            verdict = f"{len(found['residuals'])},{periods},{p:.3g},{found['describes']}"
+            seconds = sum(one["seconds"][1] - one["seconds"][0] for one in found["stretches"] if one["motion"] == "1:1")
+            possible = sum(one["excluded"] is None for one in found["hypotheses"])
+            verdict = f"{seconds:.1f},{possible},{found['p_value']:.3g},{found['describes']}"
             rows.append(f"{name},{seed},{verdict},{','.join(ratios)}")
             print(rows[-1], flush=True)
     file.unlink()
-    columns = ",".join(f"error_{s},u_{s}" for s in TUTORIAL)
-    text = "\n".join([f"channels,seed,points,periods,p,describes,{columns}", *rows])
+    columns = ",".join(f"error_{s},u_{s}" for s in PARAMETERS)
+    text = "\n".join([f"channels,seed,seconds_1to1,possible,p,describes,{columns}", *rows])
     (ROOT / "validation/foreign_recordings.csv").write_text(text + "\n")
 
 
