@@ -717,7 +717,7 @@ impl Problem<'_> {
             ),
             false => 0.0,
         };
-        let known = self.data.known.iter().flat_map(|known| known.residuals(x, &strength));
+        let known = self.data.known.iter().flat_map(|known| known.residuals(x, strength));
         let calibration = (self.hypothesis == Hypothesis::Reference).then(|| x[7] / self.data.calibration);
         let scene = self.data.scene.iter().flat_map(|scene| {
             let values = [x[0].exp() / TAU, x[1], x[2], x[3].exp(), x[4].exp()];
