@@ -90,7 +90,8 @@ def test_two_formats_give_the_same_fit(channels, tmp_path):
     # The levels follow each other without the motion between them, which no rig has.
     assert sum(one["seconds"][1] - one["seconds"][0] for one in held) > 0.6 * (time[-1] - time[0])
     expected = fits[0].channels["expected"][fits[0].channels["hypothesis"] == "ideal cavity"]
-    assert expected.sum() == pytest.approx(fits[0].degrees, rel=1e-3)
+    # The others are those of the scene: five equations, of which five parameters take about as much.
+    assert fits[0].degrees - 5 <= expected.sum() <= fits[0].degrees
 
 
 def call(*words, **environment):

@@ -642,7 +642,7 @@ fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
         resonance: Definition { sensor: Sensor::Q1, ..Definition::default() },
         ..wrong_scene()
     };
-    let u = [(0, 0), (0, 1), (0, 2), (1, 0), (2, 0), (2, 2)].map(|(of_response, of_base)| {
+    let u = [(0, 0), (1, 0), (0, 2), (2, 2)].map(|(of_response, of_base)| {
         let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
         let found = of_recording(recorded_as(measurands), &scene, &["mu=0"]);
         let off = of_ideal(&found);
