@@ -128,7 +128,7 @@ impl Recording {
     /// The channels as the bench has them: in m, and without their slow drift.
     ///
     /// # Errors
-    /// As [`Recording::parts`].
+    /// Channels that are no measurement of a rig near resonance; the message says which, and what to do.
     pub fn prepared(&self, knowledge: &Knowledge) -> Result<Self, RecordingError> {
         let knowledge = self.knowledge(knowledge);
         let linear = knowledge.linear;
@@ -165,7 +165,7 @@ impl Recording {
     /// The linear decay, if the base rests all the time and the damping does not depend on the amplitude.
     ///
     /// # Errors
-    /// As [`Recording::parts`], and where the base rests and the response does not decay.
+    /// As [`Recording::prepared`], and where the base rests and the response does not decay.
     pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<LinearDecay>, RecordingError> {
         let knowledge = self.knowledge(knowledge);
         let one = self.prepared(&knowledge)?;
