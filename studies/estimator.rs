@@ -203,7 +203,7 @@ impl Recorded {
 
 /// Errors over uncertainties of the curve, drive then frequency, and median uncertainties over `b epsilon` and epsilon.
 fn of_curve(truth: &IdealRig, found: &Identified) -> Option<([Vec<f64>; 2], [f64; 2])> {
-    let exact = truth.backbone(Sensor::Q1);
+    let exact = truth.backbone(Sensor::Q1)?;
     let logarithms: Vec<f64> = exact.iter().map(|point| point[0].ln()).collect();
     let [low, high] = found.curve.basis.ends;
     let low = low.max(logarithms[0] + 1.07f64.ln());

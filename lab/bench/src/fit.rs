@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use lovines::Cavity;
 use serde::Serialize;
 use thiserror::Error;
-use vines_identify::{ChannelTest, Data, EXCLUDED, Fit, Hypotheses, Rises, probability};
+use vines_identify::{ChannelTest, Data, EXCLUDED, Fit, Hypotheses, probability};
 pub use vines_identify::{FitError, Hypothesis, Known, MeasuredPoint, Quantity};
 use vines_model::Definition;
 use vines_model::numerics::{Estimate, SIGNIFICANT};
@@ -24,6 +24,8 @@ pub use recording::{LinearDecay, Recording, RecordingError, Stretch};
 
 /// Standard uncertainty of the gain of a reference that was calibrated as usual, relative.
 pub const CALIBRATION: f64 = 0.01;
+/// Probability of a larger rise of chi-square below which a state of the particle does not agree with a linear response.
+const DISAGREES: f64 = 0.01;
 
 impl ResonancePoint {
     /// The point, which was measured in these units, in metres of the oscillator.
@@ -131,10 +133,11 @@ pub struct LinearVerdict {
 }
 
 impl LinearVerdict {
-    /// Whether a state agrees with the data.
+    /// Whether a state agrees with the data: the probability of a larger rise, of two degrees of freedom, is at least 1 %.
     #[must_use]
     pub fn agrees(&self) -> [bool; 2] {
-        Rises { rises: self.rises }.agrees()
+        let is_likely = |rise: f64| probability(rise, 2.0).is_some_and(|p| p >= DISAGREES);
+        self.rises.map(|rise| rise.is_some_and(is_likely))
     }
 }
 
@@ -153,7 +156,7 @@ fn linear_verdicts(
         let states = [ParticleState::Carried, ParticleState::Free];
         let known = states
             .map(|particle| is_possible(particle).then_some(Known::Linear(MeasuredLinear { particle, ..*linear })));
-        let found = data.rises(&ideal, known);
+        let found = LinearVerdict { linear: *linear, rises: data.rises(&ideal, known) };
         let particle = match found.agrees() {
             [true, false] => ParticleState::Carried,
             [false, true] => ParticleState::Free,
@@ -251,7 +254,7 @@ pub struct HypothesisReport {
     /// Its parameters.
     pub parameters: Vec<FittedParameter>,
     /// Chi-square of each channel.
-    pub channels: Vec<ChannelReport>,
+    pub channels: Vec<ChannelTest>,
     /// Chi-square.
     pub chi_square: f64,
     /// Its degrees of freedom.
@@ -260,19 +263,6 @@ pub struct HypothesisReport {
     pub p_value: Option<f64>,
     /// Why it is excluded; absent where it is possible.
     pub excluded: Option<String>,
-}
-
-/// Chi-square of one channel.
-#[derive(Debug, Clone, Serialize)]
-pub struct ChannelReport {
-    /// Responses, frequencies or drives of points, or the file of a recording.
-    pub channel: String,
-    /// Sum of the squares of the residuals over their standard uncertainties.
-    pub chi_square: f64,
-    /// Its mean if the hypothesis and the uncertainties are right.
-    pub expected: f64,
-    /// Probability of a larger one; absent if the data say nothing about this channel.
-    pub p_value: Option<f64>,
 }
 
 /// A parameter of a fit.
@@ -319,12 +309,6 @@ impl Found {
         let (all, best) = (&self.hypotheses, self.hypotheses.best());
         let hypothesis = |fit: &Fit| {
             let [hypothesis, symbol, unit] = fit.hypothesis.names();
-            let channel = |one: &ChannelTest| ChannelReport {
-                channel: one.name.clone(),
-                chi_square: one.chi_square,
-                expected: one.expected,
-                p_value: one.p_value,
-            };
             HypothesisReport {
                 hypothesis,
                 symbol,
@@ -334,7 +318,7 @@ impl Found {
                 friction: fit.friction().map(|one| one.value),
                 u_friction: fit.friction().map(|one| one.uncertainty),
                 parameters: parameters(expected, |quantity| fit.estimate(quantity)),
-                channels: fit.channels.iter().map(channel).collect(),
+                channels: fit.channels.clone(),
                 chi_square: fit.chi_square,
                 degrees: fit.degrees,
                 p_value: fit.p_value(),

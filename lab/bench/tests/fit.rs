@@ -219,7 +219,7 @@ fn the_true_hypothesis_is_possible_with_its_strength_and_the_ranges_hold_the_rig
 fn friction_is_excluded_by_what_is_known_and_the_range_is_then_that_of_the_ideal_cavity() {
     let points = points(1e-3, 4);
     let wide = found(points.clone(), &[]);
-    let narrow = found(points.clone(), &["mu=0", "theta=0", "k_r=0", "v_y=0", "h=0", "g=0"]);
+    let narrow = found(points.clone(), &ONLY_IDEAL);
     let b = |found: &Found| found.hypotheses.range(Quantity::B).unwrap().uncertainty;
     assert!(b(&wide) > 5.0 * b(&narrow), "{} {}", b(&wide), b(&narrow));
     let ideal = fitted(&points, &[]).unwrap().estimate(Quantity::B).unwrap().uncertainty;
@@ -359,9 +359,7 @@ fn the_linear_response_is_data_for_the_state_of_the_particle_that_agrees_with_th
         particle: ParticleState::Unknown,
     };
     let judged = |linear| {
-        let known = ["mu=0", "theta=0", "k_r=0", "v_y=0", "h=0", "g=0"]
-            .map(|one| one.parse().unwrap())
-            .to_vec();
+        let known = ONLY_IDEAL.map(|one| one.parse().unwrap()).to_vec();
         let measured = Measurements {
             points: points.clone(),
             linear: vec![linear],
@@ -546,6 +544,9 @@ fn motion_at(cavity: Cavity, amplitude: f64) -> [f64; 3] {
     [amplitude, motion.omega, motion.amplitude]
 }
 
+/// What excludes all hypotheses but an ideal cavity, and a spring without a particle.
+const ONLY_IDEAL: [&str; 6] = ["mu=0", "theta=0", "k_r=0", "v_y=0", "h=0", "g=0"];
+
 /// Largest error of the ideal cavity of a recording, which must be possible and narrow.
 fn of_ideal(found: &Found) -> f64 {
     let fit = row(found, Hypothesis::Ideal);
@@ -569,7 +570,7 @@ fn a_recording_of_levels_at_any_phase_target_behind_a_filter_or_with_a_drift_giv
         ("behind a filter", recorded(" chain.snr=60 chain.filter=10")),
         ("with a drift", drifting),
     ] {
-        let off = of_ideal(&of_recording(one, &scene, &["mu=0"]));
+        let off = of_ideal(&of_recording(one, &scene, &ONLY_IDEAL));
         assert!(off < 3.0, "{name}: {off}");
     }
 }
@@ -616,7 +617,7 @@ fn a_lock_and_its_decay_give_the_parameters_whatever_the_natural_frequency_that_
         let scene = scene(&format!(
             "plant.r=0.6 plant.b=0.0101 plant.c=3.5 plant.M=3.9 plant.k={k}"
         ));
-        let off = of_ideal(&of_recording(record.clone(), &scene, &["mu=0"]));
+        let off = of_ideal(&of_recording(record.clone(), &scene, &ONLY_IDEAL));
         assert!(off < 3.0, "{k}: {off}");
     }
 }
@@ -644,7 +645,7 @@ fn velocities_and_accelerations_give_the_parameters_that_displacements_give() {
     };
     let u = [(0, 0), (1, 0), (0, 2), (2, 2)].map(|(of_response, of_base)| {
         let measurands = [of_response, of_base].map(|order| Measurand::ALL[order]);
-        let found = of_recording(recorded_as(measurands), &scene, &["mu=0"]);
+        let found = of_recording(recorded_as(measurands), &scene, &ONLY_IDEAL);
         let off = of_ideal(&found);
         let u = row(&found, Hypothesis::Ideal)
             .estimate(Quantity::R)

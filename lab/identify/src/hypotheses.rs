@@ -12,6 +12,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use lovines::Parameters;
 use nalgebra::{DMatrix, Vector3};
 use num_complex::Complex64;
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 use vines_estimate::{Backbone, Basis, CubicSpline, Curve};
@@ -60,8 +61,6 @@ pub const FEWEST_POINTS: usize = 3;
 pub const SHOWN: usize = 12;
 /// Probability below which a channel rejects a hypothesis, and at which chi-square exceeds the smallest one by chance.
 pub const EXCLUDED: f64 = 1e-3;
-/// Probability of a larger rise of chi-square below which a state of the particle does not agree with a linear response.
-const DISAGREES: f64 = 0.01;
 /// Restitution coefficients from which the minimisation begins: chi-square may have several minima.
 const FIRST_RESTITUTIONS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
 /// Number of half-widths that are tried at the start of a search.
@@ -101,9 +100,10 @@ pub enum FitError {
 }
 
 /// Chi-square of one channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelTest {
-    /// Response, frequency or drive of points, or the origin of a record.
+    /// Responses, frequencies or drives of points, or the origin of a record.
+    #[serde(rename = "channel")]
     pub name: String,
     /// Sum of the squares of the residuals over their standard uncertainties.
     pub chi_square: f64,
@@ -288,23 +288,6 @@ impl Hypotheses {
         };
         let fitted = Quantity::FITTED.iter().copied().zip(IdealRig::UNCERTAINTY);
         fitted.filter(|one| !is_determined(one)).map(|one| one.0).collect()
-    }
-}
-
-/// What the points say of a linear response that was measured beside them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rises {
-    /// Rise of the chi-square of an ideal cavity if the particle was carried along, and if it was free; absent for a state that the measurement
-    /// excludes.
-    pub rises: [Option<f64>; 2],
-}
-
-impl Rises {
-    /// Whether a state agrees with the data: the probability of a larger rise, of two degrees of freedom, is at least 1 %.
-    #[must_use]
-    pub fn agrees(&self) -> [bool; 2] {
-        let is_likely = |rise: f64| probability(rise, 2.0).is_some_and(|p| p >= DISAGREES);
-        self.rises.map(|rise| rise.is_some_and(is_likely))
     }
 }
 
@@ -503,15 +486,15 @@ impl Data {
         self.known.contains(&zero)
     }
 
-    /// What the data say of a linear response whose state is unknown, beside an ideal cavity that fits them.
+    /// Rises of the chi-square of an ideal cavity that fits the data, by a linear response in some states of the particle.
     #[must_use]
-    pub fn rises(&self, ideal: &Fit, states: [Option<Known>; 2]) -> Rises {
+    pub fn rises(&self, ideal: &Fit, states: [Option<Known>; 2]) -> [Option<f64>; 2] {
         let rise = |known: Known| {
             let with = Self { known: [&self.known[..], &[known]].concat(), ..self.clone() };
             let fit = with.problem(Hypothesis::Ideal, ideal.x).best(std::iter::once(ideal.x));
             fit.map_or(f64::INFINITY, |fit| fit.chi_square - ideal.chi_square)
         };
-        Rises { rises: states.map(|known| known.map(rise)) }
+        states.map(|known| known.map(rise))
     }
 
     /// The structure without a particle that has the points on average.

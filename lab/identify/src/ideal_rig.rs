@@ -1,11 +1,12 @@
 //! The five parameters of an ideal cavity on a mass, and its exact backbone.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::SVector;
 use vines_estimate::{Backbone, Linear};
-use vines_model::orbit::backbone_at_speed;
 use vines_model::{Definition, Dimensionless, Sensor};
+
+use crate::branch::Branch;
 
 /// The parameters of an ideal cavity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,11 +22,6 @@ pub struct IdealRig {
     /// Mass ratio.
     pub epsilon: f64,
 }
-
-/// Points of a backbone.
-const POINTS: usize = 200;
-/// Largest speed of the particle over `b omega`: the symmetric motion becomes unstable above 1.07.
-const FASTEST: f64 = 1.3;
 
 impl IdealRig {
     /// Standard uncertainties of a drawing: f0 and zeta (relative), r, b and epsilon (relative).
@@ -71,31 +67,8 @@ impl IdealRig {
         }
     }
 
-    /// The exact backbone above the fold, by rising amplitude. The speed of the particle parametrises it, because neither amplitude nor frequency is
-    /// single-valued.
-    pub fn backbone(&self, sensor: Sensor) -> Backbone {
-        let numbers = self.dimensionless(sensor);
-        let ratio = (1.0 - self.r) / (1.0 + self.r);
-        let slowest = FRAC_PI_2 / (ratio * ratio + FRAC_PI_2 * FRAC_PI_2) - 0.1 * ratio;
-        let point = |n: usize| {
-            let share = n as f64 / (POINTS - 1) as f64;
-            // Dense at the fold.
-            let [omega, c, g] = backbone_at_speed(&numbers, slowest + (FASTEST - slowest) * share.powf(1.5))?;
-            Some([c * self.b, g * self.b * self.epsilon, omega * numbers.omega0])
-        };
-        let points: Vec<[f64; 3]> = (0..POINTS).filter_map(point).collect();
-        let least = |points: &[[f64; 3]]| {
-            let half = &points[..points.len() / 2];
-            (0..half.len())
-                .min_by(|i, j| half[*i][0].total_cmp(&half[*j][0]))
-                .unwrap_or(0)
-        };
-        let mut rising: Backbone = Vec::new();
-        for point in &points[least(&points)..] {
-            if rising.last().is_none_or(|last| point[0] > last[0] * (1.0 + 1e-12)) {
-                rising.push(*point);
-            }
-        }
-        rising
+    /// The exact backbone above the fold, by rising amplitude; `None` where a fit has left what is possible.
+    pub fn backbone(&self, sensor: Sensor) -> Option<Backbone> {
+        Some(Branch::ideal(&self.dimensionless(sensor), |place| place)?.rising())
     }
 }

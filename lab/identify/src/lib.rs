@@ -17,7 +17,7 @@ mod record;
 mod regime;
 
 pub use hypotheses::{
-    ChannelTest, Data, EXCLUDED, FEWEST_POINTS, Fit, FitError, Hypotheses, MeasuredCurve, Rises, probability,
+    ChannelTest, Data, EXCLUDED, FEWEST_POINTS, Fit, FitError, Hypotheses, MeasuredCurve, probability,
 };
 pub use hypothesis::Hypothesis;
 pub use ideal_rig::IdealRig;

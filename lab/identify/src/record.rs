@@ -110,7 +110,7 @@ fn fit(curve: &Curve, sensor: Sensor, start: &IdealRig, prior: &IdealRig) -> Opt
     let mut u = IdealRig::UNCERTAINTY;
     u[2] /= prior.r * (1.0 - prior.r);
     let residuals = |x: &SVector<f64, 5>| {
-        let mut residuals = curve.residuals(&IdealRig::of(x).backbone(sensor))?.as_slice().to_vec();
+        let mut residuals = curve.residuals(&IdealRig::of(x).backbone(sensor)?)?.as_slice().to_vec();
         residuals.extend((0..5).map(|i| (x[i] - expected[i]) / u[i]));
         residuals.iter().all(|one| one.is_finite()).then_some(residuals)
     };
@@ -121,13 +121,13 @@ fn fit(curve: &Curve, sensor: Sensor, start: &IdealRig, prior: &IdealRig) -> Opt
     Some((scene, uncertainty, best.chi_square))
 }
 
-/// Step from point to point of a backbone to which the effective constants are fitted: 50 of 200 points determine three.
+/// Step from point to point of a backbone to which the effective constants are fitted: 48 of 192 points determine three.
 const BACKBONE_STRIDE: usize = 4;
 
 /// The particle whose closed form has the exact force of the scene: harmonics of the host change only its constants.
 fn effective(scene: &IdealRig, sensor: Sensor, power: i32) -> Option<Particle> {
     let linear = scene.linear();
-    let backbone: Vec<[f64; 3]> = scene.backbone(sensor).into_iter().step_by(BACKBONE_STRIDE).collect();
+    let backbone: Vec<[f64; 3]> = scene.backbone(sensor)?.into_iter().step_by(BACKBONE_STRIDE).collect();
     let particle = |x: &SVector<f64, 3>| {
         let [epsilon, b, r] = x.map(f64::exp).into();
         Particle { epsilon, b, r: r / (1.0 + r), sensor }

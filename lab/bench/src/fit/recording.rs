@@ -94,8 +94,9 @@ impl RecordingError {
 const CLOCK_WINDOW: f64 = 2.5;
 /// Periods within which a constant hardly drifts.
 const SLOW: usize = 16;
-/// How often the drift of an integral is removed.
-const PASSES: usize = 2;
+/// How often the drift of an integral is removed: twice leaves of noise at a quarter of the natural frequency, which two integrals raise sixteen times, as
+/// much as of noise near it.
+const DRIFT_PASSES: usize = 2;
 /// Periods at each end over which running means do not reach.
 const EDGE: f64 = 0.5 * (SLOW + 3) as f64;
 /// Fewest periods of a recording.
@@ -103,7 +104,7 @@ const FEWEST_PERIODS: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
 /// Fewest periods of a decay.
-const LEAST: usize = 8;
+const FEWEST_OF_DECAY: usize = 8;
 /// Smallest damping ratio of a structure.
 const LEAST_DAMPING: f64 = 1e-5;
 /// Base over its largest amplitude below which it rests, unless the noise is larger.
@@ -183,7 +184,7 @@ impl Recording {
             .collect();
         let all = rate(&decaying);
         let mean_omega = omega(&decaying);
-        if decaying.len() < LEAST || all.value < SEEN * all.uncertainty {
+        if decaying.len() < FEWEST_OF_DECAY || all.value < SEEN * all.uncertainty {
             let Self { origin, channels: [response, drive], .. } = self;
             let base = if self.drive_is_named() {
                 format!("the base {drive} rests")
@@ -191,7 +192,7 @@ impl Recording {
                 "no channel of the base is named".into()
             };
             return Err(RecordingError(format!(
-                "{origin}: {base}, and the response {response} does not decay for {LEAST} periods. Name the channel of the base with --drive NAME:UNIT; if it is named, is \
+                "{origin}: {base}, and the response {response} does not decay for {FEWEST_OF_DECAY} periods. Name the channel of the base with --drive NAME:UNIT; if it is named, is \
                  it connected?"
             )));
         }
@@ -200,7 +201,9 @@ impl Recording {
             |[one, other]: [Estimate; 2]| (1.0 / DAMPING_RATIO..DAMPING_RATIO).contains(&(one.value / other.value));
         // Held levels whose base is not recorded fall as slowly in both halves, but in steps.
         let is_step = |one: Estimate| !is_steady([one, all]) && (one.value - all.value).abs() > SEEN * one.uncertainty;
-        let has_steps = decaying.chunks_exact(2 * LEAST).any(|piece| is_step(rate(piece)));
+        let has_steps = decaying
+            .chunks_exact(2 * FEWEST_OF_DECAY)
+            .any(|piece| is_step(rate(piece)));
         let is_linear = is_steady([first, second].map(rate)) && !has_steps;
         Ok(is_linear.then(|| LinearDecay { omega: mean_omega, zeta: all.scaled(1.0 / mean_omega.value) }))
     }
@@ -533,7 +536,7 @@ fn displacements(values: &[f64], of: Measurand, natural: f64) -> Vec<f64> {
             (before, *value) = (*value, sum);
         }
         // An integral raises the noise below the natural frequency.
-        for _ in 0..PASSES {
+        for _ in 0..DRIFT_PASSES {
             remove_drift(&mut values, (TAU / natural).round() as usize, 1);
         }
     }

@@ -608,8 +608,8 @@ fn a_backbone_of_a_few_levels_is_tracked_to_the_last_one_near_the_fold() {
 /// Instant at which the lock has been held for thirty samples.
 const HELD: f64 = f64::INFINITY;
 
-/// The drive is zero so many seconds after a fault, and the error says which channel contradicts. The path that the check has measured shows an amplifier
-/// that clips also where the scene has no limit. Where 22 % of the force is left at the resonance, a cell that reads a third is slower to show than the
+/// After each fault the drive is zero within the seconds of its row, and the error names the channel that contradicts the path that the check has
+/// measured: so an amplifier that clips is found also where the scene has no limit. Where 22 % of the force is left at the resonance, a cell that reads a third is slower to show than the
 /// 0.3 s asked for: it loses two thirds of what is asked for, and the control has to add to it.
 #[test]
 fn faults_of_a_shaker_end_the_drive_in_time_with_the_channel_that_contradicts() {
