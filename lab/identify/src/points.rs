@@ -23,19 +23,9 @@ impl MeasuredPoint {
     /// This point with response and drive, which are in these units, in metres of the oscillator.
     #[must_use]
     pub fn in_metres(self, units: &Units) -> Self {
-        self.each(units, Unit::in_metres)
-    }
-
-    /// This point with response and drive in these units.
-    #[must_use]
-    pub fn in_units(self, units: &Units) -> Self {
-        self.each(units, Unit::of_metres)
-    }
-
-    fn each(self, units: &Units, convert: fn(Unit, f64) -> f64) -> Self {
-        let converted = |unit, Estimate { value, uncertainty }| Estimate {
-            value: convert(unit, value),
-            uncertainty: convert(unit, uncertainty),
+        let converted = |unit: Unit, Estimate { value, uncertainty }| Estimate {
+            value: unit.in_metres(value),
+            uncertainty: unit.in_metres(uncertainty),
         };
         Self {
             response: converted(units.response, self.response),
