@@ -8,18 +8,21 @@
 //! where it does not depend on the speed) within 1.96 half-widths of the range, and the `worst` of them; `row`, the same share for the true
 //! hypothesis alone; `possible`, share in which the true hypothesis is possible, and `named`, in which the ideal one is not.
 //!
-//! Arguments: RIGS, SEED. Writes validation/hypotheses.csv.
+//! Arguments: points or records, RIGS, SEED. Writes validation/hypotheses.csv.
 
 mod common;
+mod recorder;
 
 use common::*;
 use lovines::{Cavity, Restitution};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+use recorder::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
-use vines_bench::fit::{Found, Hypothesis, MeasuredPoint, Measurements, Quantity, find};
+use vines_bench::fit::{Found, Hypothesis, MeasuredPoint, Measurements, Quantity, Recording, find};
 use vines_bench::scene::{Parameters, Scene};
+use vines_identify::IdealRig;
 use vines_model::Definition;
 use vines_model::numerics::Estimate;
 use vines_model::orbit::resonant_motion;
@@ -33,19 +36,6 @@ struct Rig {
     cubic: f64,
     gain: f64,
     hypothesis: Hypothesis,
-}
-
-fn plant([f0, zeta, epsilon, r, b]: [f64; 5], cavity: Cavity) -> Parameters {
-    let omega0 = TAU * f0;
-    Parameters {
-        primary_mass: 1.0,
-        stiffness: omega0 * omega0,
-        damping: 2.0 * zeta * omega0,
-        particle_mass: epsilon,
-        half_width: b,
-        restitution: r,
-        cavity,
-    }
 }
 
 /// A rig with an effect whose strength is drawn.
@@ -69,8 +59,8 @@ fn drawn(uniform: Uniform, hypothesis: Hypothesis) -> Rig {
     let mut about: [f64; 5] = std::array::from_fn(|i| values[i] * wrong[i]);
     about[3] = (r + uniform(-0.15, 0.15)).clamp(0.2, 0.95);
     Rig {
-        truth: plant(values, cavity),
-        scene: plant(about, Cavity::IDEAL),
+        truth: parameters(values, cavity),
+        scene: parameters(about, Cavity::IDEAL),
         cubic: if hypothesis == Hypothesis::Cubic {
             share * epsilon
         } else {
@@ -113,6 +103,28 @@ fn points(rig: &Rig, snr: f64, seed: u64) -> Option<Vec<MeasuredPoint>> {
     (0..10).map(point).collect()
 }
 
+/// A record of the rig, of all kinds of motion; `None` where most of it is not 1:1.
+fn record(rig: &Rig, snr: f64, seed: u64) -> Option<Recording> {
+    let of = |quantity: Quantity| quantity.of_plant(&rig.truth);
+    let ideal = IdealRig {
+        f0: of(Quantity::F0),
+        zeta: of(Quantity::Zeta),
+        r: of(Quantity::R),
+        b: of(Quantity::B),
+        epsilon: of(Quantity::Epsilon),
+    };
+    let levels = schedule("mix", &ideal).ok()?;
+    let mut plant = plant(rig.truth, levels[0]).ok()?;
+    let found = recorded(&mut plant, &ideal, &levels, [snr, seed as f64]).ok()?;
+    let period = 1.0 / ideal.f0;
+    let held = levels.iter().filter(|level| **level > 0.0).count();
+    let is_one_to_one = (0..held).filter(|n| found.is_one_to_one(*n as f64 * period, period));
+    (2 * is_one_to_one.count() > held).then(|| {
+        let drive = found.base.iter().map(|value| value * (1.0 + rig.gain)).collect();
+        recording(found.response, drive, found.sample_time)
+    })
+}
+
 /// Errors over half-widths of the range and of the true row, whether anything, the true row and the ideal row are possible.
 struct Judged {
     range: Vec<f64>,
@@ -142,32 +154,46 @@ fn judged(rig: &Rig, found: &Found) -> Judged {
     }
 }
 
+/// What is found of a rig; `None` without a result.
+fn found(rig: &Rig, is_known: bool, measured: Measurements, default: &Scene) -> Option<Judged> {
+    let exact = |quantity: Quantity| {
+        let value = quantity.of_plant(&rig.truth);
+        format!("{}={value}±{}", quantity.symbol()[0], 0.003 * value)
+            .parse()
+            .ok()
+    };
+    let known = [Quantity::B, Quantity::Epsilon].into_iter().filter(|_| is_known);
+    let measured = Measurements { known: known.filter_map(exact).collect(), ..measured };
+    let scene = Scene { plant: rig.scene, ..default.clone() };
+    Some(judged(rig, &find(&measured, &scene, |_| {}).ok()?))
+}
+
 fn main() -> Result<(), Failure> {
-    let [rigs, seed] = [1, 2].map(|n| std::env::args().nth(n).and_then(|text| text.parse::<f64>().ok()));
-    let (rigs, seed): (usize, u64) = (rigs.unwrap_or(25.0) as usize, seed.unwrap_or(1.0) as u64);
-    let default = Scene::load(None, &[])?;
+    let [data, rigs, seed] = &arguments(["points|records", "RIGS", "SEED"])?;
+    let (rigs, seed): (usize, u64) = (rigs.parse()?, seed.parse()?);
+    let default = scene("", &["resonance.sensor=q1"])?;
     let mut lines = Vec::new();
     for (number, hypothesis) in Hypothesis::ALL.into_iter().take(7).enumerate() {
+        // A plant has no cubic stiffness.
+        if data == "records" && hypothesis == Hypothesis::Cubic {
+            continue;
+        }
         for (snr, is_known) in [(60.0, false), (60.0, true), (40.0, false), (40.0, true)] {
             let one = |n: usize| {
                 let own = seed * 1_000_000 + (number * 10_000 + n) as u64;
                 let rig = drawn(&mut uniform(own), hypothesis);
-                let points = points(&rig, snr, own)?;
-                let exact = |quantity: Quantity| {
-                    let value = quantity.of_plant(&rig.truth);
-                    format!("{}={value}±{}", quantity.symbol()[0], 0.003 * value)
-                        .parse()
-                        .ok()
+                let measured = if data == "records" {
+                    Measurements {
+                        recordings: vec![record(&rig, snr, own)?],
+                        ..Measurements::default()
+                    }
+                } else {
+                    Measurements { points: points(&rig, snr, own)?, ..Measurements::default() }
                 };
-                let known = [Quantity::B, Quantity::Epsilon]
-                    .into_iter()
-                    .filter(|_| is_known)
-                    .filter_map(exact);
-                let measured = Measurements { points, known: known.collect(), ..Measurements::default() };
-                let scene = Scene { plant: rig.scene, ..default.clone() };
-                Some(judged(&rig, &find(&measured, &scene, |_| {}).ok()?))
+                Some(found(&rig, is_known, measured, &default))
             };
-            let all: Vec<Judged> = (0..rigs).into_par_iter().filter_map(one).collect();
+            let drawn: Vec<Option<Judged>> = (0..rigs).into_par_iter().filter_map(one).collect();
+            let (count, all) = (drawn.len(), drawn.into_iter().flatten().collect::<Vec<_>>());
             let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
             let kept: Vec<&Judged> = all.iter().filter(|one| one.possible[0]).collect();
             let within = |of: &[f64]| of.iter().filter(|off| **off <= 1.96).count();
@@ -190,15 +216,15 @@ fn main() -> Result<(), Failure> {
             );
             let known = if is_known { "b epsilon" } else { "nothing" };
             let line = format!(
-                "{},{snr},{known},{seed},{},{:.3},{covered:.3},{worst:.2},{row:.3},{possible:.3},{named:.3}",
+                "{data},{},{snr},{known},{seed},{count},{},{:.3},{covered:.3},{worst:.2},{row:.3},{possible:.3},{named:.3}",
                 hypothesis.names()[0],
-                all.len(),
+                count - all.len(),
                 share(all.len() - kept.len(), all.len()),
             );
             println!("{line}");
             lines.push(line);
         }
     }
-    let header = "hypothesis,snr_dB,known,seed,rigs,rejected,covered,worst,row,possible,named";
-    write("hypotheses", header, 4, &lines)
+    let header = "data,hypothesis,snr_dB,known,seed,rigs,without,rejected,covered,worst,row,possible,named";
+    write("hypotheses", header, 5, &lines)
 }
