@@ -819,14 +819,14 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
             self.of_data(&at)
         };
         let before = self.of_data(&here)?;
+        let [low, high] = [0, 1].map(|end| self.limits().map(|limits| limits[end]));
         let mut rows = vec![Unknowns::zeros(); before.len()];
         for i in (0..UNKNOWNS).filter(|i| self.is_free(*i) && *i != 5) {
-            // Where there is no motion on one side the difference is taken on the other one.
-            let difference = |step: f64| {
-                let (there, step) = moved(x, i, step);
-                Some((of_data(&there)?, step))
-            };
-            let (there, step) = difference(step).or_else(|| difference(-step))?;
+            // Where there is no motion on one side the difference is taken on the other one, or is smaller: near the loss of symmetry a motion bears
+            // hardly any tilt.
+            let steps = [1.0, -1.0, 0.1, -0.1, 0.01, -0.01].map(|share| share * step);
+            let mut within = steps.iter().filter(|step| (low[i]..=high[i]).contains(&(x[i] + **step)));
+            let (there, step) = within.find_map(|step| Some((of_data(&moved(x, i, *step))?, step)))?;
             for ((row, there), here) in rows.iter_mut().zip(there).zip(&before) {
                 row[i] = (there - here) / step;
             }

@@ -33,19 +33,18 @@ pub(crate) fn unknowns(plant: &Parameters) -> Unknowns {
     ])
 }
 
-/// The unknowns with one moved by a step; the strengths by a share of themselves.
-pub(crate) fn moved(x: &Unknowns, i: usize, step: f64) -> (Unknowns, f64) {
-    let step = if i >= 6 && x[i] != 0.0 { step * x[i].abs() } else { step };
+/// The unknowns with one moved by a step.
+pub(crate) fn moved(x: &Unknowns, i: usize, step: f64) -> Unknowns {
     let mut x = *x;
     x[i] += step;
-    (x, step)
+    x
 }
 
 /// The gradient of a quantity.
 pub(crate) fn gradient(x: &Unknowns, of: impl Fn(&Unknowns) -> f64) -> Unknowns {
     Unknowns::from_fn(|i, _| {
-        let ((low, below), (high, above)) = (moved(x, i, -STEP), moved(x, i, STEP));
-        (of(&high) - of(&low)) / (above - below)
+        let [low, high] = [-STEP, STEP].map(|step| of(&moved(x, i, step)));
+        (high - low) / (2.0 * STEP)
     })
 }
 
