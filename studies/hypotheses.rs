@@ -76,7 +76,7 @@ fn drawn(uniform: Uniform, hypothesis: Hypothesis) -> Rig {
 }
 
 /// Ten points of the rig; `None` where it has no such motion.
-fn points(rig: &Rig, snr: f64, seed: u64) -> Option<Vec<MeasuredPoint>> {
+fn points(rig: &Rig, definition: Definition, snr: f64, seed: u64) -> Option<Vec<MeasuredPoint>> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut measured = |value: f64, relative: f64| {
         let normal: f64 = StandardNormal.sample(&mut random);
@@ -91,7 +91,7 @@ fn points(rig: &Rig, snr: f64, seed: u64) -> Option<Vec<MeasuredPoint>> {
     let low = 1.1 * manifold.c(manifold.b_min());
     let point = |n: u32| {
         let c = low + (high - low) * f64::from(n) / 9.0;
-        let motion = resonant_motion(&rig.truth, Definition::default(), c * rig.truth.half_width, None).ok()?;
+        let motion = resonant_motion(&rig.truth, definition, c * rig.truth.half_width, None).ok()?;
         let omega = motion.omega * (1.0 + 0.375 * rig.cubic * c * c);
         Some(MeasuredPoint {
             response: measured(motion.response.norm(), u),
@@ -188,7 +188,10 @@ fn main() -> Result<(), Failure> {
                         ..Measurements::default()
                     }
                 } else {
-                    Measurements { points: points(&rig, snr, own)?, ..Measurements::default() }
+                    Measurements {
+                        points: points(&rig, default.definition(), snr, own)?,
+                        ..Measurements::default()
+                    }
                 };
                 Some(found(&rig, is_known, measured, &default))
             };

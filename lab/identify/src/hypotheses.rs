@@ -825,7 +825,9 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
             // Where there is no motion on one side the difference is taken on the other one, or is smaller: near the loss of symmetry a motion bears
             // hardly any tilt.
             let steps = [1.0, -1.0, 0.1, -0.1, 0.01, -0.01].map(|share| share * step);
-            let mut within = steps.iter().filter(|step| (low[i]..=high[i]).contains(&(x[i] + **step)));
+            let mut within = steps
+                .iter()
+                .filter(|step| (low[i]..=high[i]).contains(&(x[i] + **step)));
             let (there, step) = within.find_map(|step| Some((of_data(&moved(x, i, *step))?, step)))?;
             for ((row, there), here) in rows.iter_mut().zip(there).zip(&before) {
                 row[i] = (there - here) / step;

@@ -30,9 +30,9 @@ pub enum Hypothesis {
     Spring,
 }
 
-/// Strengths from which a search begins, typical, weak and strong, over that which gives the particle the acceleration `b omega0²`: a typical
-/// friction and tilt are about 0.03 and 2 degrees on the default rig.
-pub(crate) const STRENGTHS: [f64; 3] = [0.01, 0.001, 0.05];
+/// Strengths from which a search begins, typical, none and strong, over that which gives the particle the acceleration `b omega0²`: a typical
+/// friction and tilt are about 0.03 and 2 degrees on the default rig. Without a strength it is the ideal cavity that fits best.
+pub(crate) const STRENGTHS: [f64; 3] = [0.01, 0.0, 0.05];
 
 impl Hypothesis {
     /// All of them.

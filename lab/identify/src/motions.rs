@@ -91,6 +91,17 @@ impl Motions<'_> {
         self.hypothesis.changed(&self.x, place).into()
     }
 
+    /// Of a line across the curve, the direction that a motion has no part of, in the units of the tangent: that of the curve where lengths are over the
+    /// uncertainties of a point. Another plant's motion on the line is then the nearest one to the first order.
+    fn normal(&self, n: usize, tangent: [f64; 2]) -> [f64; 2] {
+        let Goal::Point(point) = &self.goals[n] else {
+            return tangent;
+        };
+        let ([length, rate], u) = (self.units(), uncertainties(point));
+        let normal = [tangent[0] * (length / u[0]).powi(2), tangent[1] * (rate / u[1]).powi(2)];
+        normal.map(|component| component / normal[0].hypot(normal[1]))
+    }
+
     /// The motion of goal `n` near `near` on the line across the curve, `ahead` of it.
     fn motion(&self, n: usize, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<PlantMotion> {
         let [length, rate] = self.units();
@@ -98,7 +109,7 @@ impl Motions<'_> {
             near.response.norm() + ahead * tangent[0] * length,
             near.omega + ahead * tangent[1] * rate,
         ];
-        self.on_line(n, near, at, tangent)
+        self.on_line(n, near, at, self.normal(n, tangent))
     }
 
     fn on_line(&self, n: usize, near: &PlantMotion, at: [f64; 2], normal: [f64; 2]) -> Option<PlantMotion> {
