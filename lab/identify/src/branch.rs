@@ -137,3 +137,42 @@ pub(crate) fn spring([omega0, zeta, h, b]: [f64; 4], definition: Definition, [lo
     };
     Branch::even(&equally_spaced(low, high, PLACES).map(place).collect::<Vec<_>>())
 }
+
+#[cfg(test)]
+mod tests {
+    use vines_model::Sensor;
+    use vines_model::orbit::resonant_motion;
+    use vines_model::theory::B_SYMMETRY_BREAKING;
+
+    use super::*;
+    use crate::hypothesis::{Hypothesis, numbers, plant};
+    use crate::quantity::Unknowns;
+
+    #[test]
+    fn the_curve_of_an_ideal_cavity_goes_through_the_motions_of_the_plant_at_light_and_heavy_damping() {
+        for (zeta, r, epsilon) in [(0.019, 0.62, 0.0218), (0.007, 0.7, 0.0264), (0.002, 0.5, 0.004_f64)] {
+            for sensor in [Sensor::Q1, Sensor::V] {
+                let definition = Definition { sensor, ..Definition::default() };
+                let [omega0, b]: [f64; 2] = [20.0, 0.005];
+                let x = Unknowns::from([omega0.ln(), zeta, r, b.ln(), epsilon.ln(), 0.0, 0.0, 0.0]);
+                let ideal = plant(&x, Hypothesis::Ideal.cavity([0.0; 2], r, 1.0));
+                let branch = Branch::ideal(&numbers(&x, definition), |place| place).unwrap();
+                // Of a heavy particle the motion of the mass loses its symmetry before first-order theory says so.
+                let manifold = Manifold::new(r);
+                for n in 0..10 {
+                    let [low, high] = [
+                        1.1 * manifold.c(manifold.b_min()),
+                        0.85 * manifold.c(B_SYMMETRY_BREAKING),
+                    ];
+                    let c = low + (high - low) * f64::from(n) / 9.0;
+                    let motion = resonant_motion(&ideal, definition, c * b, None).unwrap();
+                    let exact = Vector3::new(motion.response.norm(), motion.omega, motion.amplitude);
+                    let u = exact.component_mul(&Vector3::new(1e-5, 1e-7, 1e-5));
+                    let near = branch.at(branch.nearest(&exact, &u).unwrap())[0];
+                    let off = (near - exact).component_div(&u).norm();
+                    assert!(off < 0.3, "{sensor:?}, epsilon = {epsilon}, C = {c}: {off}");
+                }
+            }
+        }
+    }
+}
