@@ -39,14 +39,13 @@ pub struct Component {
 }
 
 macro_rules! component {
-    ($identifier:literal, $package:literal, $xml:literal) => {
+    ($identifier:literal, $package:literal, $xml:expr) => {
         Component {
             identifier: $identifier,
             package: $package,
             // With the GUID of the library.
-            xml: fmi2_component_build::describe(include_str!($xml))
-                .expect("build.rs of the component has accepted this text"),
-            library_guid: fmi2_component_build::guid_of(include_str!($xml))
+            xml: fmi2_component_build::describe($xml).expect("build.rs of the component has accepted this text"),
+            library_guid: fmi2_component_build::guid_of($xml)
                 .expect("build.rs of the component has accepted this text"),
             png: include_bytes!(concat!("pack/pictures/", $identifier, ".png")),
             page: Cow::Borrowed(concat!(
@@ -61,12 +60,8 @@ macro_rules! component {
 /// The plant and the controller.
 pub fn components() -> [Component; 2] {
     [
-        component!("LoViNes", "lovines-fmu", "../../modelDescription.xml"),
-        component!(
-            "PhaseLock",
-            "phase-lock-fmu",
-            "../../controller/fmu/modelDescription.xml"
-        ),
+        component!("LoViNes", "lovines-fmu", lovines::MODEL_DESCRIPTION),
+        component!("PhaseLock", "phase-lock-fmu", phase_lock::MODEL_DESCRIPTION),
     ]
 }
 
