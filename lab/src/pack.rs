@@ -1,6 +1,7 @@
 //! Packing: a description and shared libraries become an FMU, a zip archive; two FMUs and a scene become a coupled system in the format of
 //! SSP 1.0, System Structure and Parameterization. The same input gives the same bytes.
 
+mod lock;
 mod structure;
 
 use std::borrow::Cow;
@@ -39,7 +40,7 @@ pub struct Component {
 }
 
 macro_rules! component {
-    ($identifier:literal, $package:literal, $xml:expr) => {
+    ($identifier:literal, $package:literal, $xml:expr, $resources:expr) => {
         Component {
             identifier: $identifier,
             package: $package,
@@ -52,16 +53,17 @@ macro_rules! component {
                 include_str!(concat!("pack/pictures/", $identifier, ".svg")),
                 include_str!(concat!("pack/pictures/", $identifier, ".html"))
             )),
-            resources: Vec::new(),
+            resources: $resources,
         }
     };
 }
 
 /// The plant and the controller.
 pub fn components() -> [Component; 2] {
+    let [plant, controller] = lock::resources();
     [
-        component!("LoViNes", "lovines-fmu", lovines::MODEL_DESCRIPTION),
-        component!("PhaseLock", "phase-lock-fmu", phase_lock::MODEL_DESCRIPTION),
+        component!("LoViNes", "lovines-fmu", lovines::MODEL_DESCRIPTION, plant),
+        component!("PhaseLock", "phase-lock-fmu", phase_lock::MODEL_DESCRIPTION, controller),
     ]
 }
 
@@ -259,29 +261,38 @@ fn system(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
         let [derived, own] = ["derived".into(), value.to_string()].map(|value| format!(" {attribute}=\"{value}\""));
         structure = structure.replace(&derived, &own);
     }
-    // The start of the plant goes by its parameters: some masters set no start value of an output.
-    let plant = scene.start_values().into_iter().map(|(name, value)| {
-        let parameter = START_PARAMETERS.iter().find(|(output, _)| *output == name);
-        (parameter.map_or(name, |(_, parameter)| parameter), value)
-    });
-    // The controller is armed from the start.
-    let config = scene.controller_config();
-    let controller = PARAMETERS
-        .iter()
-        .map(|parameter| (parameter.name, parameter.get(&config)));
-    let controller = controller.chain([("active", Value::Boolean(true))]);
     let entries = [
         ("SystemStructure.ssd".to_owned(), structure.into_bytes()),
-        ("resources/plant.ssv".to_owned(), parameter_set("plant", plant)),
+        (
+            "resources/plant.ssv".to_owned(),
+            parameter_set("plant", plant_values(scene)),
+        ),
         (
             "resources/controller.ssv".to_owned(),
-            parameter_set("controller", controller),
+            parameter_set("controller", controller_values(scene)),
         ),
     ];
     let fmus = fmus
         .iter()
         .map(|(name, content)| (format!("resources/{name}"), content.clone()));
     archive("bench.ssp".into(), entries.into_iter().chain(fmus))
+}
+
+/// Parameters and start of the plant. The start goes by its parameters: some masters set no start value of an output.
+fn plant_values(scene: &Scene) -> impl Iterator<Item = (&'static str, Value)> {
+    scene.start_values().into_iter().map(|(name, value)| {
+        let parameter = START_PARAMETERS.iter().find(|(output, _)| *output == name);
+        (parameter.map_or(name, |(_, parameter)| parameter), value)
+    })
+}
+
+/// Settings of the controller, which is armed from the start.
+fn controller_values(scene: &Scene) -> impl Iterator<Item = (&'static str, Value)> {
+    let config = scene.controller_config();
+    let settings = PARAMETERS
+        .iter()
+        .map(move |parameter| (parameter.name, parameter.get(&config)));
+    settings.chain([("active", Value::Boolean(true))])
 }
 
 /// A file of parameter values. Every set has its own name, since some masters merge sets of the same name.

@@ -4,11 +4,13 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from fmpy import simulate_fmu, supported_platforms
 from fmpy.fmi1 import FMICallException
+from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
 from references import ROOT
@@ -78,6 +80,33 @@ def test_a_library_is_small_stripped_and_without_paths_of_the_machine_that_built
     assert b"\0.debug_info\0" not in content
     for folder in (ROOT, Path.home(), Path.home() / ".cargo"):
         assert bytes(folder) + b"/" not in content, folder
+
+
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_the_experiment_inside_an_fmu_gives_the_results_beside_it_and_ends_in_a_lock(fmus, name, figure):
+    folder = fmus[name].folder / "resources"
+    (experiment,) = ElementTree.parse(folder / "experiments.xml").getroot()
+    files = {element.tag: folder / element.get("source") for element in experiment}
+    values = {
+        parameter.get("name"): parameter[0].get("value")
+        for parameter in ElementTree.parse(files["Parameters"]).getroot()[0]
+    }
+    expected = np.genfromtxt(files["References"], delimiter=",", names=True)
+    found = simulate_fmu(
+        str(fmus[name].path),
+        stop_time=float(experiment.get("stopTime")),
+        output_interval=float(experiment.get("stepSize")),
+        start_values=values,
+        input=read_csv(files["Stimuli"]),
+        output=expected.dtype.names[1:],
+        fmi_type="CoSimulation",
+    )
+    rows = np.searchsorted(found["time"], expected["time"] - float(experiment.get("stepSize")) / 2)
+    for column in expected.dtype.names[1:]:
+        off = np.abs(found[column][rows] - expected[column]).max() / np.abs(expected[column]).max()
+        figure(f"{name}.fmu: its own experiment, {column} off, relative", off, below=1e-9)
+    if name == "PhaseLock":
+        assert found["locked"][-1]
 
 
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
