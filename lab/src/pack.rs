@@ -13,7 +13,7 @@ use std::str::FromStr;
 
 use fmi2_description::Description;
 use maud::{DOCTYPE, PreEscaped, html};
-use phase_lock::{PARAMETERS, Value};
+use phase_lock::{Config, PARAMETERS, Value};
 use vines_fmu::{PLATFORMS, own_platforms};
 use vines_model::ArgumentError;
 use zip::{ZipWriter, result::ZipError, write::SimpleFileOptions};
@@ -269,7 +269,7 @@ fn system(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
         ),
         (
             "resources/controller.ssv".to_owned(),
-            parameter_set("controller", controller_values(scene)),
+            parameter_set("controller", controller_values(&scene.controller_config())),
         ),
     ];
     let fmus = fmus
@@ -287,11 +287,10 @@ fn plant_values(scene: &Scene) -> impl Iterator<Item = (&'static str, Value)> {
 }
 
 /// Settings of the controller, which is armed from the start.
-fn controller_values(scene: &Scene) -> impl Iterator<Item = (&'static str, Value)> {
-    let config = scene.controller_config();
+fn controller_values(config: &Config) -> impl Iterator<Item = (&'static str, Value)> {
     let settings = PARAMETERS
         .iter()
-        .map(move |parameter| (parameter.name, parameter.get(&config)));
+        .map(move |parameter| (parameter.name, parameter.get(config)));
     settings.chain([("active", Value::Boolean(true))])
 }
 

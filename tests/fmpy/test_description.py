@@ -35,7 +35,7 @@ def test_the_fmu_is_a_co_simulation_component_for_this_platform(fmus, name):
     assert description.coSimulation.canHandleVariableCommunicationStepSize
     exchange = description.modelExchange
     assert (exchange and exchange.modelIdentifier) == (name if name == "LoViNes" else None)
-    assert description.variableNamingConvention == "structured"
+    assert description.variableNamingConvention == "flat"
     assert "linux64" in supported_platforms(str(fmus[name].path))
 
 

@@ -4,15 +4,15 @@
 use std::fmt::Write;
 
 use lovines::{Drive, InvalidValue, Plant};
-use phase_lock::{Input, Output};
+use phase_lock::{Config, Input, Output, PhaseLock};
 
 use super::{File, controller_values, parameter_set, plant_values};
 use crate::scene::{PAPER, Scene};
 
-/// Samples per natural period: fewer than those of the scene, to keep the files small.
-const SAMPLES: u32 = 25;
-/// Natural periods; the loop has locked by then.
-const PERIODS: u32 = 200;
+/// Samples per second, 23 in a natural period: fewer than those of the scene, to keep the files small, and times of few digits.
+const RATE: u32 = 200;
+/// Length of the experiment, s; the loop has locked by then.
+const STOP: u32 = 40;
 
 /// The columns of one FMU.
 struct Half {
@@ -29,11 +29,11 @@ impl Half {
     }
 
     /// The files in `resources/`.
-    fn files(self, parameters: Vec<u8>, step: f64) -> Vec<File> {
-        let stop = f64::from(PERIODS * SAMPLES) * step;
+    fn files(self, parameters: Vec<u8>) -> Vec<File> {
+        let step = 1.0 / f64::from(RATE);
         let experiment = format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Experiments name=\"vines\">\n  <Experiment name=\"lock\" startTime=\"0\" \
-             stopTime=\"{stop}\" stepSize=\"{step}\"\n    description=\"The coupled pair locks; each FMU gets what the other one has put out\">\n    \
+             stopTime=\"{STOP}\" stepSize=\"{step}\"\n    description=\"The coupled pair locks; each FMU gets what the other one has put out\">\n    \
              <Parameters type=\"application/x-ssp-parameter-set\" source=\"lock.ssv\"/>\n    <Stimuli type=\"text/csv\" \
              source=\"lock-stimuli.csv\"/>\n    <References type=\"text/csv\" source=\"lock-references.csv\"/>\n  </Experiment>\n</Experiments>\n"
         );
@@ -54,33 +54,33 @@ fn rounded(value: f64) -> f64 {
 
 /// The files of plant and controller.
 pub(super) fn resources() -> [Vec<File>; 2] {
-    let samples = format!("controller.samples_per_period={SAMPLES}").parse();
-    let samples = samples.expect("a key of a scene with its value");
-    let scene = Scene::parse("paper.toml", PAPER, &[samples]).expect("the default scene is correct");
-    let (plant, controller) = couple(&scene).expect("the values of a correct scene are allowed");
-    let step = scene.sample_time();
+    let scene = Scene::parse("paper.toml", PAPER, &[]).expect("the default scene is correct");
+    let config = Config {
+        sample_time: 1.0 / f64::from(RATE),
+        ..scene.controller_config()
+    };
+    let lock = config
+        .build()
+        .expect("the controller of the default scene allows this sample time");
+    let [plant, controller] = couple(&scene, &lock).expect("the values of a correct scene are allowed");
     [
-        plant.files(parameter_set("plant", plant_values(&scene)), step),
-        controller.files(parameter_set("controller", controller_values(&scene)), step),
+        plant.files(parameter_set("plant", plant_values(&scene))),
+        controller.files(parameter_set("controller", controller_values(&config))),
     ]
 }
 
 /// Couples the cores as a master couples their FMUs: at each sample both are read, fed, and stepped.
-fn couple(scene: &Scene) -> Result<(Half, Half), InvalidValue> {
-    let lock = scene.controller_config().build().expect("the default scene is correct");
+fn couple(scene: &Scene, lock: &PhaseLock) -> Result<[Half; 2], InvalidValue> {
     let (mut state, mut output) = (lock.start(), lock.idle());
     let mut plant = Plant::new(scene.plant, scene.start)?;
-    let (mut of_plant, mut of_controller) = (
-        Half::new("E,omega", "v,base,impacts"),
-        Half::new("response,reference,active", "omega,E,response_amplitude,locked"),
-    );
-    let step = scene.sample_time();
-    for n in 0..=PERIODS * SAMPLES {
-        let time = f64::from(n) * step;
-        let base = plant.base_displacement();
-        let (v, impacts) = (plant.state().q1 - base, plant.totals().impacts);
+    let mut of_plant = Half::new("E,omega", "v,base,impacts");
+    let mut of_controller = Half::new("response,reference,active", "omega,E,response_amplitude,locked");
+    for n in 0..=STOP * RATE {
+        let time = f64::from(n) / f64::from(RATE);
+        let (base, masses, impacts) = (plant.base_displacement(), plant.state(), plant.totals().impacts);
+        let v = masses.q1 + scene.plant.mass_ratio() * masses.q2;
         let Output { omega, amplitude, response_amplitude, locked, .. } = output;
-        if n > 0 && n % SAMPLES == 0 {
+        if n > 0 && n % RATE == 0 {
             let locked = u8::from(locked);
             let _ = writeln!(of_plant.references, "{time},{v:e},{base:e},{impacts}");
             let _ = writeln!(
@@ -91,8 +91,11 @@ fn couple(scene: &Scene) -> Result<(Half, Half), InvalidValue> {
         let [response, reference, amplitude, omega] = [v, base, amplitude, omega].map(rounded);
         let _ = writeln!(of_plant.stimuli, "{time},{amplitude:e},{omega:e}");
         let _ = writeln!(of_controller.stimuli, "{time},{response:e},{reference:e},1");
-        plant.advance(Drive { amplitude, omega, ..Drive::default() }, step)?;
+        plant.advance(
+            Drive { amplitude, omega, ..Drive::default() },
+            lock.config().sample_time,
+        )?;
         output = lock.process(&mut state, Input { response, reference: Some(reference), active: true });
     }
-    Ok((of_plant, of_controller))
+    Ok([of_plant, of_controller])
 }
