@@ -109,7 +109,7 @@ def command_line(program):
 def variables():
     """Tables of the variables of both FMUs."""
     page = "# Variables of the FMUs\n\n" + NOTE
-    for name, file in (("LoViNes", "modelDescription.xml"), ("PhaseLock", "controller/fmu/modelDescription.xml")):
+    for name, file in (("LoViNes", "modelDescription.xml"), ("PhaseLock", "controller/modelDescription.xml")):
         model = ElementTree.parse(ROOT / file).getroot()
         page += f"\n## {name}.fmu\n\n{model.get('description')}.\n"
         types = {kind.get("name"): kind[0] for kind in model.iter("SimpleType")}

@@ -41,6 +41,19 @@ progress() {
     fi
 }
 
+# rust_tool NAME VERSION [options of cargo install]: a program of a crate, in target/tools/bin, which comes first in PATH. The first call
+# builds it, some minutes.
+rust_tool() {
+    local tools=$target/tools
+    export PATH="$tools/bin:$PATH"
+    case $("$tools/bin/$1" --version 2>/dev/null) in
+        *"$2") return ;;
+    esac
+    stage "Installing $1 $2 (some minutes)"
+    cargo install "$1" --quiet --locked --version "$2" --root "$tools" --target-dir "$tools/build" "${@:3}"
+    rm -rf "$tools/build"
+}
+
 # environment FOLDER REQUIREMENTS [options of pip]: a Python environment with the packages of a requirements file. Those of the
 # scripts have the hash of every package. It is created again when the file changes. If the packages cannot be installed, it returns 1 and leaves pip's output in FOLDER.log.
 environment() {

@@ -1,4 +1,4 @@
-//! A linear oscillator with a vibro-impact nonlinear energy sink, exact between events.
+#![doc = include_str!("README.md")]
 #![forbid(unsafe_code)]
 
 mod advance;
@@ -21,6 +21,9 @@ mod structure;
 mod system;
 pub mod table;
 pub mod variation;
+
+/// `modelDescription.xml` of the plant's FMU (FMI 2.0): its variables, written once.
+pub const MODEL_DESCRIPTION: &str = include_str!("../modelDescription.xml");
 
 pub use base_motion::{BaseMotion, Drive};
 pub use contact::Wall;

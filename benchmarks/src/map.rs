@@ -15,7 +15,7 @@ use vines_model::{Dimensionless, map::observe, regime::Regime};
 use crate::baseline::Baseline;
 use crate::median;
 
-/// Mass ratio of the default scene (scenes/paper.toml).
+/// Mass ratio of the default scene (lab/scene/paper.toml).
 const EPSILON: f64 = 0.032 / 3.807;
 /// Detuning and base amplitude where its loop locks.
 const LOCK: (f64, f64) = (-1.1394, 1.1);

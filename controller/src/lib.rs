@@ -62,6 +62,9 @@ mod signals;
 mod stationarity;
 mod supervisor;
 
+/// `modelDescription.xml` of the controller's FMU (FMI 2.0): its variables, written once.
+pub const MODEL_DESCRIPTION: &str = include_str!("../modelDescription.xml");
+
 pub use amplitude_loop::{MOVE, Move};
 pub use config::{
     Config, ConfigError, Detector, LockCriterion, MAX_HARMONICS, NONE, Number, PARAMETERS, Parameter, Range, Value,

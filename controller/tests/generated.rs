@@ -81,7 +81,7 @@ fn the_header_of_c_follows_from_the_sources() {
     );
 }
 
-const DESCRIPTION: &str = include_str!("../fmu/modelDescription.xml");
+const DESCRIPTION: &str = include_str!("../modelDescription.xml");
 const HEADER: &str = include_str!("../capi/include/phase_lock.h");
 
 #[test]

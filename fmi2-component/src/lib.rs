@@ -31,21 +31,21 @@
 //! }
 //! ```
 //!
-//! `src/lib.rs` implements [`Component`] for a struct and ends with `fmi2_component::export!(MyComponent)`. The repository has a whole
-//! example, a water tank, in `fmi2-component/example/`, with its description.
+//! `src/lib.rs` implements [`Component`] for a struct and ends with `fmi2_component::export!(MyComponent)`. The repository has a folder to
+//! copy, `fmi2-component/template/`, and a larger example, a water tank, in `fmi2-component/example/`.
 //!
 //! A component whose equations a master may integrate also implements [`ModelExchange`], and is
 //! exported by `fmi2_component::export!(MyComponent, model_exchange)`. Its description lists states and derivatives
 //! in `ModelStructure`, once; `exchange.rs` of `lovines-fmu`, the FMU of the plant, is an example.
 //!
 //! The FMU is a zip of the description, as `fmi2_component_build::describe` completes it, and of the library as
-//! `binaries/linux64/<modelIdentifier>.so` (or the platform's equivalent). The example program `pack` of
+//! `binaries/linux64/<modelIdentifier>.so` (or the platform's equivalent). The program `fmi2-pack` of
 //! `fmi2-component-build` makes it:
 //!
 //! ```sh
-//! cargo build --release -p fmi2-example-tank
-//! cargo run -p fmi2-component-build --example pack -- \
-//!     fmi2-component/example/modelDescription.xml target/release/libfmi2_example_tank.so .
+//! cargo install fmi2-component-build --features pack
+//! cargo build --release
+//! fmi2-pack modelDescription.xml target/release/libmy_component.so .
 //! ```
 //!
 //! # What a component can rely on

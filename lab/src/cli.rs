@@ -49,7 +49,7 @@ Examples:
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
 
-Without --scene, the default scene built into the program is used; it is scenes/paper.toml.
+Without --scene, the default scene built into the program is used; it is lab/scene/paper.toml.
 
 Exit codes:
     0  success

@@ -1,6 +1,7 @@
 //! Packing: a description and shared libraries become an FMU, a zip archive; two FMUs and a scene become a coupled system in the format of
 //! SSP 1.0, System Structure and Parameterization. The same input gives the same bytes.
 
+mod lock;
 mod structure;
 
 use std::borrow::Cow;
@@ -12,7 +13,7 @@ use std::str::FromStr;
 
 use fmi2_description::Description;
 use maud::{DOCTYPE, PreEscaped, html};
-use phase_lock::{PARAMETERS, Value};
+use phase_lock::{Config, PARAMETERS, Value};
 use vines_fmu::{PLATFORMS, own_platforms};
 use vines_model::ArgumentError;
 use zip::{ZipWriter, result::ZipError, write::SimpleFileOptions};
@@ -39,34 +40,30 @@ pub struct Component {
 }
 
 macro_rules! component {
-    ($identifier:literal, $package:literal, $xml:literal) => {
+    ($identifier:literal, $package:literal, $xml:expr, $resources:expr) => {
         Component {
             identifier: $identifier,
             package: $package,
             // With the GUID of the library.
-            xml: fmi2_component_build::describe(include_str!($xml))
-                .expect("build.rs of the component has accepted this text"),
-            library_guid: fmi2_component_build::guid_of(include_str!($xml))
+            xml: fmi2_component_build::describe($xml).expect("build.rs of the component has accepted this text"),
+            library_guid: fmi2_component_build::guid_of($xml)
                 .expect("build.rs of the component has accepted this text"),
             png: include_bytes!(concat!("pack/pictures/", $identifier, ".png")),
             page: Cow::Borrowed(concat!(
                 include_str!(concat!("pack/pictures/", $identifier, ".svg")),
                 include_str!(concat!("pack/pictures/", $identifier, ".html"))
             )),
-            resources: Vec::new(),
+            resources: $resources,
         }
     };
 }
 
 /// The plant and the controller.
 pub fn components() -> [Component; 2] {
+    let [plant, controller] = lock::resources();
     [
-        component!("LoViNes", "lovines-fmu", "../../modelDescription.xml"),
-        component!(
-            "PhaseLock",
-            "phase-lock-fmu",
-            "../../controller/fmu/modelDescription.xml"
-        ),
+        component!("LoViNes", "lovines-fmu", lovines::MODEL_DESCRIPTION, plant),
+        component!("PhaseLock", "phase-lock-fmu", phase_lock::MODEL_DESCRIPTION, controller),
     ]
 }
 
@@ -264,29 +261,37 @@ fn system(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
         let [derived, own] = ["derived".into(), value.to_string()].map(|value| format!(" {attribute}=\"{value}\""));
         structure = structure.replace(&derived, &own);
     }
-    // The start of the plant goes by its parameters: some masters set no start value of an output.
-    let plant = scene.start_values().into_iter().map(|(name, value)| {
-        let parameter = START_PARAMETERS.iter().find(|(output, _)| *output == name);
-        (parameter.map_or(name, |(_, parameter)| parameter), value)
-    });
-    // The controller is armed from the start.
-    let config = scene.controller_config();
-    let controller = PARAMETERS
-        .iter()
-        .map(|parameter| (parameter.name, parameter.get(&config)));
-    let controller = controller.chain([("active", Value::Boolean(true))]);
     let entries = [
         ("SystemStructure.ssd".to_owned(), structure.into_bytes()),
-        ("resources/plant.ssv".to_owned(), parameter_set("plant", plant)),
+        (
+            "resources/plant.ssv".to_owned(),
+            parameter_set("plant", plant_values(scene)),
+        ),
         (
             "resources/controller.ssv".to_owned(),
-            parameter_set("controller", controller),
+            parameter_set("controller", controller_values(&scene.controller_config())),
         ),
     ];
     let fmus = fmus
         .iter()
         .map(|(name, content)| (format!("resources/{name}"), content.clone()));
     archive("bench.ssp".into(), entries.into_iter().chain(fmus))
+}
+
+/// Parameters and start of the plant. The start goes by its parameters: some masters set no start value of an output.
+fn plant_values(scene: &Scene) -> impl Iterator<Item = (&'static str, Value)> {
+    scene.start_values().into_iter().map(|(name, value)| {
+        let parameter = START_PARAMETERS.iter().find(|(output, _)| *output == name);
+        (parameter.map_or(name, |(_, parameter)| parameter), value)
+    })
+}
+
+/// Settings of the controller, which is armed from the start.
+fn controller_values(config: &Config) -> impl Iterator<Item = (&'static str, Value)> {
+    let settings = PARAMETERS
+        .iter()
+        .map(move |parameter| (parameter.name, parameter.get(config)));
+    settings.chain([("active", Value::Boolean(true))])
 }
 
 /// A file of parameter values. Every set has its own name, since some masters merge sets of the same name.

@@ -1,9 +1,9 @@
-//! Turns scenes/paper.toml and live/settings.json into constants, so that the module needs neither a TOML nor a JSON reader.
+//! Turns lab/scene/paper.toml and lab/page/settings.json into constants, so that the module needs neither a TOML nor a JSON reader.
 
 use std::{env, error::Error, fmt::Write, fs, path::Path};
 
-const SCENE: &str = "../../scenes/paper.toml";
-const SETTINGS: &str = "../settings.json";
+const SCENE: &str = "../../lab/scene/paper.toml";
+const SETTINGS: &str = "../../lab/page/settings.json";
 
 fn main() -> Result<(), Box<dyn Error>> {
     for file in [SCENE, SETTINGS] {

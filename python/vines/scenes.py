@@ -21,7 +21,7 @@ class Scene:
     text : str, optional
         A scene as TOML text instead.
     **sections : mapping
-        Values that replace those of the scene, by section: `plant={"r": 0.7}`. scenes/paper.toml has all
+        Values that replace those of the scene, by section: `plant={"r": 0.7}`. lab/scene/paper.toml has all
         sections and keys with their units.
 
     Raises

@@ -44,7 +44,7 @@ def circle(arrows: dict[str, set[str]]) -> set[str]:
         ("lab/scene/src", "rs", RUST),
         ("lab/model/src", "rs", RUST),
         ("lab/model/src/orbit", "rs", SIBLING),
-        ("live/page", "js", SCRIPT),
+        ("lab/page", "js", SCRIPT),
     ],
 )
 def test_no_file_depends_on_one_that_depends_on_it(folder, ending, pattern):

@@ -1,11 +1,16 @@
 """What the FMUs say of themselves, their libraries, and the example of the shell."""
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from fmpy import simulate_fmu, supported_platforms
+from fmpy.fmi1 import FMICallException
+from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
 from references import ROOT
@@ -30,7 +35,7 @@ def test_the_fmu_is_a_co_simulation_component_for_this_platform(fmus, name):
     assert description.coSimulation.canHandleVariableCommunicationStepSize
     exchange = description.modelExchange
     assert (exchange and exchange.modelIdentifier) == (name if name == "LoViNes" else None)
-    assert description.variableNamingConvention == "structured"
+    assert description.variableNamingConvention == "flat"
     assert "linux64" in supported_platforms(str(fmus[name].path))
 
 
@@ -77,15 +82,80 @@ def test_a_library_is_small_stripped_and_without_paths_of_the_machine_that_built
         assert bytes(folder) + b"/" not in content, folder
 
 
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_the_experiment_inside_an_fmu_gives_the_results_beside_it_and_ends_in_a_lock(fmus, name, figure):
+    folder = fmus[name].folder / "resources"
+    (experiment,) = ElementTree.parse(folder / "experiments.xml").getroot()
+    files = {element.tag: folder / element.get("source") for element in experiment}
+    values = {
+        parameter.get("name"): parameter[0].get("value")
+        for parameter in ElementTree.parse(files["Parameters"]).getroot()[0]
+    }
+    expected = np.genfromtxt(files["References"], delimiter=",", names=True)
+    found = simulate_fmu(
+        str(fmus[name].path),
+        stop_time=float(experiment.get("stopTime")),
+        output_interval=float(experiment.get("stepSize")),
+        start_values=values,
+        input=read_csv(files["Stimuli"]),
+        output=expected.dtype.names[1:],
+        fmi_type="CoSimulation",
+    )
+    rows = np.searchsorted(found["time"], expected["time"] - float(experiment.get("stepSize")) / 2)
+    for column in expected.dtype.names[1:]:
+        off = np.abs(found[column][rows] - expected[column]).max() / np.abs(expected[column]).max()
+        figure(f"{name}.fmu: its own experiment, {column} off, relative", off, below=1e-9)
+    if name == "PhaseLock":
+        assert found["locked"][-1]
+
+
+TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+SHELL = ROOT / "fmi2-component"
+
+
+def packed(description: Path, library: Path, folder: Path) -> str:
+    """The FMU that `fmi2-pack` makes."""
+    program = ("-p", "fmi2-component-build", "--features", "pack", "--bin", "fmi2-pack")
+    done = subprocess.run(
+        ["cargo", "run", "--locked", "--quiet", *program, "--", description, library, folder],
+        check=True,
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    return done.stdout.strip()
+
+
 def test_fmpy_finds_no_problem_in_the_example_of_the_shell_and_simulates_it(tmp_path):
-    built = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "debug"
-    library, pack = built / "deps" / "libfmi2_example_tank.so", built / "examples" / "pack"
-    for file in (library, pack):
-        assert file.is_file(), f"{file} is missing; `cargo test --workspace --no-run` builds it"
-    description = ROOT / "fmi2-component/example/modelDescription.xml"
-    subprocess.run([pack, description, library, tmp_path], check=True, cwd=ROOT)
-    tank = str(tmp_path / "Tank.fmu")
+    library = TARGET / "debug" / "deps" / "libfmi2_example_tank.so"
+    assert library.is_file(), f"{library} is missing; `cargo test --workspace --no-run` builds it"
+    tank = packed(SHELL / "example" / "modelDescription.xml", library, tmp_path)
     assert validate_fmu(tank) == []
     found = simulate_fmu(tank, stop_time=20, start_values={"inflow": 0.1}, output=["level", "overflows"])
     assert found["level"][40] == pytest.approx(0.5 + 0.1 / 2 * found["time"][40])
     assert (found["level"][-1], found["overflows"][-1]) == (1, 1)
+
+
+def test_a_copy_of_the_template_of_the_shell_becomes_an_fmu_that_fmpy_simulates(tmp_path):
+    model = tmp_path / "lag"
+    shutil.copytree(SHELL / "template", model)
+    shutil.copy(ROOT / "Cargo.lock", model)
+    # The crates of this repository, as long as no index has them.
+    ours = {"fmi2-component": SHELL, "fmi2-component-build": SHELL / "build", "fmi2-description": SHELL / "description"}
+    patches = [f'--config=patch.crates-io.{name}.path="{folder}"' for name, folder in ours.items()]
+    target = TARGET / "template"
+    subprocess.run(["cargo", "build", "--offline", "--quiet", "--target-dir", target, *patches], check=True, cwd=model)
+    lag = packed(model / "modelDescription.xml", target / "debug" / "liblag.so", tmp_path)
+    assert validate_fmu(lag) == []
+    found = simulate_fmu(lag, stop_time=3, output_interval=0.5, start_values={"T": 2, "u": 1}, output=["y"])
+    assert found["y"] == pytest.approx(1 - np.exp(-found["time"] / 2))
+    with pytest.raises(FMICallException):
+        simulate_fmu(lag, start_values={"T": 0})
+
+
+def test_the_readme_of_the_shell_shows_the_template():
+    text = (SHELL / "README.md").read_text()
+    for file in ("src/lib.rs", "modelDescription.xml"):
+        assert (SHELL / "template" / file).read_text() in text, file
+    manifest = (SHELL / "template" / "Cargo.toml").read_text()
+    assert manifest[manifest.index("[lib]") : manifest.index("\n[workspace]")] in text

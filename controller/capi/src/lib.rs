@@ -6,10 +6,6 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![warn(missing_docs)]
 
-// Single precision under the same name.
-#[cfg(feature = "f32")]
-extern crate phase_lock_f32 as phase_lock;
-
 use core::ffi::{c_char, c_int};
 use core::fmt::{Display, Write};
 

@@ -100,7 +100,7 @@ fn renumbered(text: &str, present: &[&str]) -> String {
 
 #[test]
 fn the_parameters_of_the_model_description_follow_from_the_settings() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("modelDescription.xml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../modelDescription.xml");
     let present = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = present.split_once("  <ModelVariables>\n").unwrap();
     let (parameters, after) = rest.split_once("    <ScalarVariable name=\"response\"").unwrap();

@@ -5,7 +5,7 @@ use fmi2_description::Description;
 
 const DESCRIPTIONS: [&[u8]; 3] = [
     include_bytes!("../../../modelDescription.xml"),
-    include_bytes!("../../../controller/fmu/modelDescription.xml"),
+    include_bytes!("../../../controller/modelDescription.xml"),
     include_bytes!("../../example/modelDescription.xml"),
 ];
 /// What damages XML and numbers.

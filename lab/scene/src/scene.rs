@@ -64,7 +64,7 @@ pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 pub use vines_rig::{Name, Names};
 
 /// The default scene, embedded so that the program works from any folder.
-pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
+pub const PAPER: &str = include_str!("../paper.toml");
 
 /// Largest number of times the default samples that a scene takes by itself, a limit of run time: a backbone then takes about a minute.
 const OVERSAMPLED: f64 = 16.0;

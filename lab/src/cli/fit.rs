@@ -1,6 +1,7 @@
 //! `vines fit`: the parameters of a rig from measured points of its backbone.
 
 use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use serde::Serialize;
@@ -406,6 +407,25 @@ fn contradiction(found: &Found, report: &FitReport) -> String {
     }
 }
 
+/// The date in UTC, as `2026-11-29`. Years begin on 1 March, so that a leap day is the last day of one (H. Hinnant, chrono-Compatible
+/// Low-Level Date Algorithms, `civil_from_days`).
+fn date(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    // Days since 1 March of the year 0, and in an era of 400 years.
+    let days = seconds / 86_400 + 719_468;
+    let (era, day) = (days / 146_097, days % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let day = day - (153 * month + 2) / 5 + 1;
+    let (year, month) = if month < 10 {
+        (year, month + 3)
+    } else {
+        (year + 1, month - 9)
+    };
+    format!("{:04}-{month:02}-{day:02}", 400 * era + year)
+}
+
 /// Where the plant of a scene comes from.
 fn provenance(files: &[PathBuf], report: &FitReport) -> String {
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
@@ -413,7 +433,7 @@ fn provenance(files: &[PathBuf], report: &FitReport) -> String {
     format!(
         "# Fitted by vines {} on {} to {}: {},\n# chi-square {:.1} for {} degrees of freedom{p}.\n\n",
         env!("CARGO_PKG_VERSION"),
-        chrono::Utc::now().format("%Y-%m-%d"),
+        date(SystemTime::now()),
         files.join(", "),
         report.best,
         report.chi_square,

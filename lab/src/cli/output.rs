@@ -180,13 +180,35 @@ impl Temporary {
     }
 }
 
+/// Warnings on stderr.
+struct Warnings;
+
+impl log::Log for Warnings {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.level() <= log::Level::Warn
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        if self.enabled(record.metadata()) {
+            // A warning is no result: a closed stderr does not matter.
+            let _ = writeln!(
+                io::stderr(),
+                "[{:<5} {}] {}",
+                record.level(),
+                record.target(),
+                record.args()
+            );
+        }
+    }
+
+    fn flush(&self) {}
+}
+
 /// Warnings go to stderr: warnings of connections, and what an FMU logs.
 pub(super) fn log_warnings() {
+    log::set_max_level(log::LevelFilter::Warn);
     // A report runs several commands.
-    let _ = env_logger::Builder::new()
-        .filter_level(log::LevelFilter::Warn)
-        .format_timestamp(None)
-        .try_init();
+    let _ = log::set_logger(&Warnings);
 }
 
 /// Time between two lines of progress where stderr is no terminal.

@@ -153,7 +153,7 @@ impl Controller for WatchedController {
 
 // Evaluation.
 
-/// A row of the record, with the columns of the page's module (live/page/module.js); NaN: not measured.
+/// A row of the record, with the columns of the page's module (lab/page/module.js); NaN: not measured.
 type Row = [f64; 11];
 
 /// Makes rows from the samples of a session, and keeps the last of them.
@@ -347,7 +347,7 @@ fn table(title: &str, scene: &Scene) -> Value {
     let d = scene.dimensionless();
     let lock = scene.controller_config().lock;
     let ([plus, minus], cavity) = (scene.plant.gaps(), scene.plant.cavity);
-    let mut table: Value = serde_json::from_str(include_str!("../../../live/settings.json")).unwrap_or_default();
+    let mut table: Value = serde_json::from_str(include_str!("../../page/settings.json")).unwrap_or_default();
     table["watch"] = json!({
         "title": title,
         "values": {
@@ -376,7 +376,7 @@ macro_rules! files {
     ($($name:ident . $kind:ident)*) => {
         &[$((
             concat!("/", stringify!($name), ".", stringify!($kind)),
-            include_str!(concat!("../../../live/page/", stringify!($name), ".", stringify!($kind)))
+            include_str!(concat!("../../page/", stringify!($name), ".", stringify!($kind)))
         )),*]
     };
 }

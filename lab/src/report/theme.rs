@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn the_live_page_has_the_colours_of_the_table() {
-        let style = include_str!("../../../live/page/style.css").to_uppercase();
+        let style = include_str!("../../page/style.css").to_uppercase();
         let (light, dark) = style.split_once("@MEDIA (PREFERS-COLOR-SCHEME: DARK)").unwrap();
         let mut found = 0;
         for [name, on_paper, on_screen] in STYLES.iter() {

@@ -65,7 +65,7 @@ fn values(mut action: impl FnMut(&mut Bench, &mut Vec<f64>) -> Result<(), Messag
     })
 }
 
-/// Address of the settings, `f64` each, in the order and the units of live/settings.json. The first call fills in the default
+/// Address of the settings, `f64` each, in the order and the units of lab/page/settings.json. The first call fills in the default
 /// scene.
 // SAFETY of the exported names: none of them is a symbol of the C library or of the Rust runtime.
 #[unsafe(no_mangle)]

@@ -1,6 +1,6 @@
 //! The live bench: plant, phase-locked loop and theory behind plain C exports, for a page in a browser.
 //!
-//! The page and the module exchange numbers through arrays whose addresses the exports return. `live/settings.json` lists the
+//! The page and the module exchange numbers through arrays whose addresses the exports return. `lab/page/settings.json` lists the
 //! settings; [`exports`] lists the columns of the other arrays. All computation is that of the crates `lovines`, `phase-lock`,
 //! `vines-model` and `vines-testbench`: this crate only runs them sample by sample.
 

@@ -6,7 +6,7 @@ use vines_bench::scene::{
     Scene,
 };
 
-/// Constants from scenes/paper.toml and live/settings.json: the default scene, and an index for each setting.
+/// Constants from lab/scene/paper.toml and lab/page/settings.json: the default scene, and an index for each setting.
 mod generated {
     #![allow(missing_docs)]
     include!(concat!(env!("OUT_DIR"), "/generated.rs"));
@@ -14,10 +14,10 @@ mod generated {
 pub use generated::{COUNT, index};
 use generated::{EXCITATION, PLANT, START};
 
-/// Values of the settings, in the order and the units of live/settings.json.
+/// Values of the settings, in the order and the units of lab/page/settings.json.
 pub type Settings = [f64; COUNT];
 
-/// The scene in scenes/paper.toml.
+/// The scene in lab/scene/paper.toml.
 #[must_use]
 pub fn default_scene() -> Scene {
     let [primary_mass, stiffness, damping, particle_mass, half_width, restitution] = PLANT;

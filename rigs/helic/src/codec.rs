@@ -3,7 +3,6 @@
 use std::ffi::CStr;
 use std::io::{self, Read};
 
-use crc::{CRC_16_IBM_3740, Crc};
 use thiserror::Error;
 
 const MAGIC: [u8; 2] = *b"HL";
@@ -15,8 +14,19 @@ pub const MAX_PAYLOAD: usize = 1024;
 pub(crate) const MAX_VALUES: usize = (1472 - 20) / 4;
 /// Number of harmonics of a Fourier series, whose coefficients are mean, cosines, sines.
 pub(crate) const HARMONICS: usize = 16;
-/// The checksum of a frame, "CCITT-FALSE": polynomial 0x1021, initial value 0xffff.
-pub const CHECKSUM: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+/// The checksum of a frame, "CCITT-FALSE": polynomial 0x1021, initial value 0xffff, most significant bit first.
+pub fn checksum(bytes: &[u8]) -> u16 {
+    bytes.iter().fold(0xffff, |sum, byte| {
+        let shift = |sum: u16| {
+            if sum & 0x8000 == 0 {
+                sum << 1
+            } else {
+                (sum << 1) ^ 0x1021
+            }
+        };
+        (0..8).fold(sum ^ (u16::from(*byte) << 8), |sum, _| shift(sum))
+    })
+}
 
 /// Types of a request. The answer has the type of the request, or [`message::ERROR`].
 #[expect(missing_docs, reason = "the names of the protocol")]
@@ -118,7 +128,7 @@ impl Frame {
     pub fn encode(&self) -> Vec<u8> {
         let length = (self.payload.len() as u16).to_le_bytes();
         let mut bytes = [&MAGIC[..], &[self.kind, self.sequence], &length, &self.payload].concat();
-        bytes.extend(CHECKSUM.checksum(&bytes[2..]).to_le_bytes());
+        bytes.extend(checksum(&bytes[2..]).to_le_bytes());
         bytes
     }
 
@@ -131,7 +141,7 @@ impl Frame {
                 _ => 0,
             };
             let whole = bytes.get(..length + 8).and_then(<[u8]>::split_last_chunk);
-            let is_damaged = whole.is_some_and(|(frame, sum)| CHECKSUM.checksum(&frame[2..]).to_le_bytes() != *sum);
+            let is_damaged = whole.is_some_and(|(frame, sum)| checksum(&frame[2..]).to_le_bytes() != *sum);
             if !MAGIC.starts_with(&bytes[..bytes.len().min(2)]) || length > MAX_PAYLOAD || is_damaged {
                 return Err(io::Error::other(ErrorCode::BadFrame));
             }

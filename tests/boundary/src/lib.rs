@@ -30,7 +30,7 @@ const MODELS: [[&str; 2]; 3] = [
 /// Their descriptions.
 const DESCRIPTIONS: [&str; 3] = [
     include_str!("../../../modelDescription.xml"),
-    include_str!("../../../controller/fmu/modelDescription.xml"),
+    include_str!("../../../controller/modelDescription.xml"),
     include_str!("../../../fmi2-component/example/modelDescription.xml"),
 ];
 

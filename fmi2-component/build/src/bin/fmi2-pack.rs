@@ -1,10 +1,4 @@
-//! Makes an FMU of a description and a library: `pack modelDescription.xml LIBRARY FOLDER`.
-//!
-//! ```sh
-//! cargo build --release -p fmi2-example-tank
-//! cargo run -p fmi2-component-build --example pack -- \
-//!     fmi2-component/example/modelDescription.xml target/release/libfmi2_example_tank.so .
-//! ```
+//! Makes an FMU of a description and a library: `fmi2-pack modelDescription.xml LIBRARY FOLDER`.
 
 use std::error::Error;
 use std::fs;
@@ -47,7 +41,7 @@ fn main() {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let done = match &arguments[..] {
         [description, library, folder] => pack(description, library, folder),
-        _ => Err("usage: pack modelDescription.xml LIBRARY FOLDER".into()),
+        _ => Err("usage: fmi2-pack modelDescription.xml LIBRARY FOLDER".into()),
     };
     if let Err(error) = done {
         eprintln!("error: {error}");
