@@ -8,11 +8,11 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{Matrix3, RowVector3, Vector3};
 use num_complex::Complex64;
-use vines_model::numerics::complex_fit;
+use vines_model::numerics::{SIGNIFICANT, complex_fit};
 
 use super::{
-    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NEWTON_STEPS, NOTED, OpenLoop, PHASE, Verdict,
-    fitted, of_response, quantity,
+    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Fitted, Linear, LoopCheck, NOTED, OpenLoop, PHASE, Verdict, Window,
+    noise_of, of_response, quantity,
 };
 use crate::rig::{Rig, RigError, Scaled};
 use vines_scene::linear::LinearResponse;
@@ -21,8 +21,9 @@ use vines_scene::plan::Plan;
 use vines_scene::scene::{PLACES, frequencies};
 use vines_scene::shaker_path::ShakerPath;
 
-/// Periods of a window, and most windows at a frequency.
-const STEADY_WINDOW: [usize; 2] = [8, 100];
+/// Periods of a window, and most periods at a frequency.
+const STEADY_WINDOW: usize = 8;
+const MOST_PERIODS: f64 = 800.0;
 /// Largest relative change from window to window of a steady motion.
 const STEADY_CHANGE: f64 = 1e-4;
 
@@ -47,7 +48,7 @@ pub(super) fn check(
         all.push(Steady::of(&mut rig, omega, amplitude)?);
     }
     let samples = window(linear.omega0, plan.knowledge.sample_time);
-    rig.end(samples / STEADY_WINDOW[0])?;
+    rig.end(samples / STEADY_WINDOW)?;
     let near = &all[..PLACES.len()];
     let Steady { both: at, noise, .. } = near[PLACES.len() / 2];
     let curve = Curve::of(near, &linear);
@@ -101,7 +102,7 @@ pub(super) fn check(
 
 /// Samples of a window at a frequency, rad/s.
 fn window(omega: f64, sample_time: f64) -> usize {
-    (STEADY_WINDOW[0] as f64 * TAU / (omega * sample_time)).round() as usize
+    (STEADY_WINDOW as f64 * TAU / (omega * sample_time)).round() as usize
 }
 
 /// What response and reference read at a frequency when they are steady.
@@ -121,32 +122,39 @@ impl Steady {
     /// Drives with the frequency `omega`, rad/s, and this amplitude, m.
     fn of(rig: &mut OpenLoop<impl Rig + ?Sized>, omega: f64, amplitude: f64) -> Result<Self, RigError> {
         let samples = window(omega, rig.step);
-        let (mut last, mut before) = ([Complex64::ZERO; 2], [Complex64::ZERO; 2]);
-        let (mut noise, mut periods) = ([0.0; 2], 0.0);
-        for _ in 0..STEADY_WINDOW[1] {
+        let mut periods = 0.0;
+        loop {
             rig.readings.clear();
             rig.drive(samples, omega, amplitude)?;
-            periods += STEADY_WINDOW[0] as f64;
+            periods += STEADY_WINDOW as f64;
             // A heavy table on the suspension of a light armature floats for hundreds of periods: a parabola in a window.
-            let both = [1, 2].map(|channel| fitted(&rig.readings, channel, 2, &rig.target, omega));
-            let change = (0..2)
-                .map(|n| (both[n].0 - last[n]).norm() / both[n].0.norm())
-                .fold(0.0, f64::max);
-            (before, last, noise) = (last, both.map(|(phasor, _)| phasor), both.map(|(_, rest)| rest));
-            // A reading that is no number never settles.
-            if change < STEADY_CHANGE || change.is_nan() {
-                break;
+            let start = Complex64::new(0.0, omega);
+            let both = [1, 2].map(|channel| {
+                let (readings, target, step) = (&rig.readings[..], rig.target, rig.step);
+                let window = Window { readings, channel, target, omega, step };
+                window.fitted(0.5 * samples as f64, 2, &[], start)
+            });
+            let [Some(response), Some(reference)] = both else {
+                let nothing = [Complex64::new(f64::NAN, 0.0); 2];
+                return Ok(Self { omega: start, both: nothing, noise: [f64::NAN; 2], periods });
+            };
+            let both = [response, reference];
+            let duration = samples as f64 * rig.step;
+            // What noise makes of a steady motion is no change.
+            let changes = |one: &Fitted| {
+                let noise = noise_of(&rig.readings, one.window.channel, &rig.target, rig.step);
+                let u = noise * one.found.u(&[Complex64::ZERO, Complex64::ONE]);
+                (one.found.pole - start).norm() * duration > STEADY_CHANGE + SIGNIFICANT * u * duration
+            };
+            if !both.iter().any(changes) || periods >= MOST_PERIODS {
+                return Ok(Self {
+                    omega: -Complex64::I * both[0].found.pole,
+                    both: [0, 1].map(|n| both[n].phasor(0)),
+                    noise: [0, 1].map(|n| both[n].noise()),
+                    periods,
+                });
             }
         }
-        let middle = [0, 1].map(|n| 0.5 * (before[n] + last[n]));
-        let duration = samples as f64 * rig.step;
-        let growth = (last[0] - before[0]) / (duration * middle[0]);
-        Ok(Self {
-            omega: omega - Complex64::I * growth,
-            both: middle,
-            noise,
-            periods,
-        })
     }
 
     /// Reference over response.
@@ -188,7 +196,7 @@ impl Curve {
             .unwrap_or_else(|| (Vector3::from_element(nothing), Matrix3::from_element(nothing)));
         let slope_at = |at: Complex64| RowVector3::new(Complex64::ZERO, Complex64::ONE, 2.0 * at);
         let mut root = -found[0] / found[1];
-        for _ in 0..NEWTON_STEPS {
+        for _ in 0..8 {
             root -= (row(root) * found)[0] / (slope_at(root) * found)[0];
         }
         let rest: f64 = rows
