@@ -62,29 +62,6 @@ impl LoopCheck {
         self.share > SHARES[0]
     }
 
-    /// Without what a channel has read.
-    fn without_numbers(has_base: bool) -> Self {
-        let nothing = f64::NAN;
-        let channel = CheckedChannel {
-            gain: nothing,
-            phase: nothing,
-            delay: nothing,
-            noise: nothing,
-            floor: nothing,
-        };
-        Self {
-            verdict: Verdict::NotANumber,
-            amplitude: 0.0,
-            share: 0.0,
-            periods: 0.0,
-            response: channel,
-            base: has_base.then_some(channel),
-            linear: None,
-            quantities: Vec::new(),
-            u_noise: 0.0,
-        }
-    }
-
     /// Whether noise hides a phase that is to be refused: the drive is too small.
     fn is_too_weak(&self) -> bool {
         // Noise does not look like exchanged channels, and more response would exceed the range of the base.
@@ -93,16 +70,6 @@ impl LoopCheck {
             Verdict::NotANumber | Verdict::NotAtRest | Verdict::Swapped
         );
         !is_certain && SIGNIFICANT * self.u_noise > PHASE.to_radians()
-    }
-
-    /// Whether another check is healthy and contradicts each quantity that this one refuses, beyond the uncertainties.
-    fn is_contradicted_by(&self, other: &Self) -> bool {
-        let pairs = self.quantities.iter().zip(&other.quantities);
-        let mut refused = pairs.filter(|(one, _)| one.refusal().is_some()).peekable();
-        let differs = |(one, other): (&CheckedQuantity, &CheckedQuantity)| {
-            (one.measured - other.measured).abs() > SIGNIFICANT * one.uncertainty.hypot(other.uncertainty)
-        };
-        other.verdict == Verdict::Healthy && refused.peek().is_some() && refused.all(differs)
     }
 }
 
@@ -127,8 +94,8 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     if plan.knowledge.shaker.is_none() && is_refused {
         let again = at_share(rig, plan, SHARES[1], MOST_WAITS.min(relaxed(plan)))?;
         let periods = found.periods + again.periods;
-        let is_contradicted = found.is_contradicted_by(&again);
-        found = if is_contradicted { again } else { found };
+        let is_healthy = again.verdict == Verdict::Healthy && !again.is_too_weak();
+        found = if is_healthy { again } else { found };
         found.periods = periods;
     }
     while found.is_too_weak() && found.share < most {
@@ -171,94 +138,118 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     rig.drive(driven, omega, amplitude)?;
     let ends = rig.readings.len();
     rig.end(samples(1))?;
-    let mut found = LoopCheck {
-        amplitude,
-        share,
-        periods: rig.readings.len() as f64 / samples(1) as f64,
-        ..LoopCheck::without_numbers(rig.has_base)
-    };
+    let periods = rig.readings.len() as f64 / samples(1) as f64;
     let (quiet, driven) = (&rig.readings[begins - quiet..begins], &rig.readings[begins..ends]);
-    judge(&mut found, quiet, driven, expected, plan);
-    Ok(found)
+    let found = judge([quiet, driven], rig.has_base, amplitude, expected, plan);
+    Ok(LoopCheck { share, periods, ..found })
 }
 
 /// Judges readings without a drive and with it; `expected`: phasors of response and base at the end.
 fn judge(
-    found: &mut LoopCheck,
-    quiet: &[[f64; 3]],
-    driven: &[[f64; 3]],
+    [quiet, driven]: [&[[f64; 3]]; 2],
+    has_base: bool,
+    amplitude: f64,
     expected: [Complex64; 2],
     plan: &Plan,
-) -> Option<()> {
-    let (omega, step, target) = (plan.lock.omega_start, plan.knowledge.sample_time, plan.knowledge.target);
-    let period = (TAU / (omega * step)).round() as usize;
+) -> LoopCheck {
+    let (target, step, omega) = (plan.knowledge.target, plan.knowledge.sample_time, plan.lock.omega_start);
+    let (sine, turn) = (Sine { target, omega, step }, omega * step);
     // The base may be late by half a period, and reads nothing before.
-    let (onset, after) = driven.split_at(period / 2);
-    let window = |readings, channel| Window { readings, channel, target, omega, step };
-    let base = window(after, 2).fitted(0.5 * after.len() as f64, 0, &[], Complex64::new(0.0, omega))?;
-    let (phasor, u_base) = match found.base {
-        Some(_) => (
+    let (onset, after) = driven.split_at(sine.period() / 2);
+    let base = sine.fitted(after, 2, 0.5 * after.len() as f64, 0, &[sine.pole()]);
+    let (phasor, u_base) = match has_base {
+        true => (
             base.phasor(0),
             base.u(&[1.0 / base.found.amplitudes[0], Complex64::ZERO]),
         ),
         // Without a sensor, the base moves as expected.
-        None => (expected[1], 0.0),
+        false => (expected[1], 0.0),
     };
-    let alone = without_other_modes(driven, plan, omega, found.amplitude);
-    let stated = plan.knowledge.linear;
-    let start = Complex64::new(-stated.damping_rate, stated.omega0);
-    let drive = [Complex64::new(0.0, omega)];
     let late = (plan.lock.delay / step).ceil();
-    let response = window(&alone[late as usize..], 1).fitted(-late, 1, &drive, start)?;
-    // Exchanged channels: the base grows as the response does.
-    let exchanged = window(&driven[late as usize..], 2).fitted(-late, 1, &drive, start)?;
+    let stated = plan.knowledge.linear;
+    let poles = [sine.pole(), Complex64::new(-stated.damping_rate, stated.omega0)];
+    let mode = |readings: &[[f64; 3]], channel| sine.fitted(&readings[late as usize..], channel, -late, 1, &poles);
+    let response = mode(&without_other_modes(driven, plan, omega, amplitude), 1);
     let white = [1, 2].map(|channel| noise_of(quiet, channel, &target, step));
-    let growth = Growth::of(&response, white[0], phasor, plan);
-    let per_drive = [response.end(), base.phasor(0)];
-    let noise = [&response, &base].map(|one| one.noise());
-    let mut channels = [0, 1].map(|n| {
-        let floor = scatter(quiet, n + 1);
-        let channel = CheckedChannel { noise: noise[n], floor, ..CheckedChannel::default() };
-        channel.at(per_drive[n] / expected[n], omega * step)
+    let (linear, per_noise) = growth(&response, white[0], (phasor, u_base), plan);
+    let ends = [response.end(), base.phasor(0)];
+    let noises = [response.noise(), base.noise()];
+    let [mut channel, of_base] = [0, 1].map(|n| {
+        let (noise, floor) = (noises[n], scatter(quiet, n + 1));
+        CheckedChannel { noise, floor, ..CheckedChannel::default() }.at(ends[n] / expected[n], turn)
     });
-    // Where noise hides the growth, it is at least the error of the phasor of a few periods.
-    let of_phasor = expected.map(|phasor| (2.0 / (EVALUATED * period as f64)).sqrt() / phasor.norm());
-    found.u_noise = (white[0] * growth.per_noise.max(of_phasor[0])).hypot(white[1] * of_phasor[1]);
-    if found.base.is_some() {
-        found.quantities.extend(of_base(&base, found.amplitude, u_base, plan));
+    let mut quantities = Vec::new();
+    if has_base {
+        quantities.extend(quantities_of_base(&base, u_base, amplitude, plan));
     }
-    let linear = growth.linear(u_base, plan);
-    if let Some(response) = &linear {
+    if let Some(linear) = &linear {
         // Amplitude and phase of the response for the natural frequency and the damping that the rig has.
         let reference = plan.knowledge.numbers.definition.reference;
-        let ratio = response.gain / response.oscillator_gain(omega, reference);
-        channels[0] = channels[0].at(ratio * phasor / expected[1], omega * step);
-        found.quantities.extend(of_response(response, ratio, plan));
+        let ratio = linear.gain / linear.oscillator_gain(omega, reference);
+        channel = channel.at(ratio * phasor / expected[1], turn);
+        quantities.extend(of_response(linear, ratio, plan));
     }
-    let waits = base.is_late(onset, quiet);
-    let crossed = [response.end() / expected[1], exchanged.end() / expected[0]];
-    let amplitudes = expected.map(|response| response.norm());
-    found.response = channels[0];
-    found.base = found.base.map(|_| channels[1]);
-    found.verdict = found.verdict(&amplitudes, crossed, [waits, relaxed(plan) <= MOST_WAITS]);
+    // Where noise hides the growth, it is at least the error of a phasor.
+    let of_phasor = expected.map(|phasor| (2.0 / driven.len() as f64).sqrt() / phasor.norm());
+    let mut found = LoopCheck {
+        verdict: Verdict::Healthy,
+        amplitude,
+        share: 0.0,
+        periods: 0.0,
+        response: channel,
+        base: has_base.then_some(of_base),
+        linear: None,
+        quantities,
+        u_noise: (white[0] * per_noise.max(of_phasor[0])).hypot(white[1] * of_phasor[1]),
+    };
+    // Exchanged channels: the base grows as the response does.
+    let crossed = [
+        response.end() / expected[1],
+        mode(driven, 2).growth() / (stated.gain * expected[1]),
+    ];
+    let waits = [base.is_late(onset, quiet), relaxed(plan) <= MOST_WAITS];
+    found.verdict = found.verdict(&expected.map(|phasor| phasor.norm()), crossed, waits);
     let linear = linear.filter(|_| found.verdict == Verdict::Healthy);
     found.linear = linear.map(|response| Linear::new(response, plan));
-    Some(())
+    found
 }
 
-/// Readings of a channel: 1, the response, or 2, the base.
-struct Window<'a> {
-    readings: &'a [[f64; 3]],
-    channel: usize,
+/// A drive of constant frequency, rad/s.
+#[derive(Clone, Copy)]
+struct Sine {
     target: Target,
-    /// Frequency of the drive, rad/s.
     omega: f64,
     step: f64,
 }
 
+impl Sine {
+    fn pole(&self) -> Complex64 {
+        Complex64::new(0.0, self.omega)
+    }
+
+    /// Samples in a period.
+    fn period(&self) -> usize {
+        (TAU / (self.omega * self.step)).round() as usize
+    }
+
+    /// Fits oscillations to the readings of a channel, 1, the response, or 2, the base, beside a trend of this degree. Amplitudes are those at the sample
+    /// `origin`; the last pole is a first value, the others are known.
+    fn fitted(self, readings: &[[f64; 3]], channel: usize, origin: f64, trend: usize, poles: &[Complex64]) -> Fitted {
+        let Self { target, omega, step } = self;
+        let values = readings.iter().map(|reading| reading[channel]);
+        let (start, known) = poles.split_last().unwrap_or((&Complex64::ZERO, &[]));
+        let found = Oscillations::new(values, [-origin * step, step], trend, known, *start);
+        let displacement = target.displacement(channel - 1, omega);
+        let unit = displacement * Complex64::cis(-readings[0][0] - origin * omega * step);
+        let variance = found.variance(omega * step, self.period());
+        Fitted { sine: self, channel, found, unit, variance }
+    }
+}
+
 /// The oscillations of a channel.
-struct Fitted<'a> {
-    window: Window<'a>,
+struct Fitted {
+    sine: Sine,
+    channel: usize,
     found: Oscillations,
     /// What makes a phasor of the displacement of the amplitude of a reading, m.
     unit: Complex64,
@@ -266,23 +257,26 @@ struct Fitted<'a> {
     variance: f64,
 }
 
-impl<'a> Window<'a> {
-    /// Fits oscillations with these known poles beside a trend of this degree. Amplitudes are those at the sample `origin`.
-    fn fitted(self, origin: f64, trend: usize, known: &[Complex64], start: Complex64) -> Option<Fitted<'a>> {
-        let Self { readings, channel, target, omega, step } = self;
-        let values = readings.iter().map(|reading| reading[channel]);
-        let found = Oscillations::new(values, [-origin * step, step], trend, known, start)?;
-        let phase = readings[0][0] + origin * omega * step;
-        let unit = target.displacement(channel - 1, omega) * Complex64::cis(-phase);
-        let variance = found.variance(omega * step, (TAU / (omega * step)).round() as usize);
-        Some(Fitted { window: self, found, unit, variance })
-    }
-}
-
-impl Fitted<'_> {
+impl Fitted {
     /// The displacement that belongs to an amplitude, relative to the drive, m.
     fn phasor(&self, n: usize) -> Complex64 {
         self.found.amplitudes[n] * self.unit
+    }
+
+    /// Phasor of a driven mode after some periods, m.
+    fn after(&self, periods: usize) -> Complex64 {
+        let time = periods as f64 * TAU / self.sine.omega;
+        self.phasor(0) + self.phasor(1) * ((self.found.pole - self.sine.pole()) * time).exp()
+    }
+
+    /// This at the end of the check.
+    fn end(&self) -> Complex64 {
+        self.after(CHECK_PERIODS[1])
+    }
+
+    /// Growth rate of a driven mode, m/s, whatever its motion was at the start.
+    fn growth(&self) -> Complex64 {
+        self.phasor(0) * (self.sine.pole() - self.found.pole)
     }
 
     /// Standard uncertainty of each component of a sum of amplitudes and the pole.
@@ -295,23 +289,56 @@ impl Fitted<'_> {
         mean_square(self.found.rest.iter().copied()).sqrt() * self.unit.norm()
     }
 
-    /// Phasor of a driven mode at the end of the check, m.
-    fn end(&self) -> Complex64 {
-        let omega = self.window.omega;
-        let free = (self.found.pole - Complex64::new(0.0, omega)) * (CHECK_PERIODS[1] as f64 * TAU / omega);
-        self.phasor(0) + self.phasor(1) * free.exp()
-    }
-
     /// Whether the first readings under the drive, `onset`, are rather those of a channel that still rests, as in `quiet`, than those of this oscillation: a
     /// delay of half a period looks like the opposite sign.
     fn is_late(&self, onset: &[[f64; 3]], quiet: &[[f64; 3]]) -> bool {
-        let Window { channel, target, omega, .. } = self.window;
-        let rest = mean(quiet.iter().map(|reading| reading[channel]));
-        let amplitude = self.phasor(0) / target.displacement(channel - 1, omega);
+        let rest = mean(quiet.iter().map(|reading| reading[self.channel]));
+        let amplitude = self.phasor(0) / self.sine.target.displacement(self.channel - 1, self.sine.omega);
         let moved = |reading: &[f64; 3]| (amplitude * Complex64::cis(reading[0])).im;
-        let error = |share: f64| mean_square(onset.iter().map(|one| one[channel] - rest - share * moved(one)));
+        let error = |share: f64| mean_square(onset.iter().map(|one| one[self.channel] - rest - share * moved(one)));
         error(0.0) < error(1.0)
     }
+}
+
+/// The linear response with this gain on a base with this phasor, m, and relative standard uncertainty, if it is more than noise; and the standard
+/// uncertainty of the gain, relative, for white noise of the standard deviation 1 m in the readings, 1/m. `white`: the noise, m.
+fn growth(
+    response: &Fitted,
+    white: f64,
+    (base, u_base): (Complex64, f64),
+    plan: &Plan,
+) -> (Option<LinearResponse>, f64) {
+    let (found, sine, periods) = (&response.found, response.sine, CHECK_PERIODS[1] as f64);
+    let rate = sine.pole() - found.pole;
+    let gain = response.growth() / base;
+    // The gain is proportional to amplitude and rate.
+    let slope = [1.0 / found.amplitudes[0], Complex64::ZERO, -1.0 / rate];
+    let [u_rate, u_gain] = [[Complex64::ZERO, Complex64::ZERO, Complex64::ONE], slope].map(|one| found.u(&one));
+    // The modes of a drawing are not quite those of the rig: what the fit leaves beyond noise does not average out.
+    let of_noise = white * white * sine.target.colour(sine.omega, sine.step);
+    let explained = of_noise * (1.0 + SIGNIFICANT * (1.0 / (periods - 3.0)).sqrt());
+    let misfit = match plan.beside.is_empty() {
+        true => 0.0,
+        false => (response.variance - explained).max(0.0),
+    };
+    let deviation = (response.variance + misfit * periods).sqrt();
+    let sizes = (0..=CHECK_PERIODS[1]).map(|n| response.after(n).norm());
+    let largest = sine.omega * sine.omega * sizes.fold(0.0, f64::max);
+    let particle = match FRICTION * largest < plan.knowledge.carried_up_to {
+        true => ParticleState::Carried,
+        false => ParticleState::Unknown,
+    };
+    let linear = LinearResponse {
+        omega0: found.pole.norm(),
+        damping_rate: rate.re,
+        uncertainty: deviation * u_rate,
+        gain,
+        u_gain: (deviation * u_gain).hypot(u_base),
+        particle,
+        shaker: None,
+    };
+    let is_determined = gain.norm().is_finite() && deviation * u_gain < DETERMINED;
+    (is_determined.then_some(linear), u_gain)
 }
 
 /// The readings of the response without what the drawing's structure adds to that of its driven mode, from rest: the beat of two modes may last longer
@@ -349,9 +376,8 @@ fn without_other_modes(readings: &[[f64; 3]], plan: &Plan, omega: f64, amplitude
 fn expected(plan: &Plan) -> [Complex64; 2] {
     let omega = plan.lock.omega_start;
     let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
-    let rate = Complex64::new(damping_rate, omega - omega0);
-    let time = CHECK_PERIODS[1] as f64 * TAU / omega;
-    let growth = Complex64::new(0.0, -0.5 * omega0) * (1.0 - (-rate * time).exp()) / rate;
+    let turned = Complex64::new(damping_rate, omega - omega0) * (CHECK_PERIODS[1] as f64 * TAU / omega);
+    let growth = plan.knowledge.linear.at(omega) * (1.0 - (-turned).exp());
     // A delay that the chain states is expected.
     let stated = Complex64::from_polar(1.0, -plan.lock.delay * omega);
     [growth * stated, stated]
@@ -505,7 +531,7 @@ fn of_response(linear: &LinearResponse, ratio: Complex64, plan: &Plan) -> [Check
 }
 
 /// Frequency of the base, and its amplitude over that of the drive.
-fn of_base(base: &Fitted, drive: f64, u: f64, plan: &Plan) -> [CheckedQuantity; 2] {
+fn quantities_of_base(base: &Fitted, u: f64, drive: f64, plan: &Plan) -> [CheckedQuantity; 2] {
     let omega = plan.lock.omega_start;
     let ratio = base.phasor(0).norm() / drive;
     // A controlled base needs no known shaker.
@@ -543,8 +569,6 @@ fn quantity(
 
 /// Largest RMS of the residual of the fit at the drive's frequency, over the amplitude.
 const NOISE: f64 = 0.15;
-/// Periods from which a phasor is seen at least.
-const EVALUATED: f64 = 4.0;
 /// Share of the expected amplitude below which a sensor is dead.
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
@@ -686,9 +710,14 @@ impl LoopCheck {
             (Verdict::ResponseLate, late || refuses(Verdict::ResponseLate)),
             (Verdict::ResponseGain, response_gain),
         ];
-        let fault = faults.into_iter().find(|(_, is)| *is);
-        fault.map_or(Verdict::Healthy, |(verdict, _)| verdict)
+        first_of(&faults)
     }
+}
+
+/// The first verdict of a table that holds.
+fn first_of(faults: &[(Verdict, bool)]) -> Verdict {
+    let fault = faults.iter().find(|(_, is)| *is);
+    fault.map_or(Verdict::Healthy, |(verdict, _)| *verdict)
 }
 
 // The linear response of a rig, and the gains that follow from it.
@@ -741,75 +770,6 @@ impl Linear {
             data: response.data(),
             response,
         }
-    }
-}
-
-/// The growth of the response.
-struct Growth<'a> {
-    response: &'a Fitted<'a>,
-    /// Gain, 1/s, and `i omega - pole`.
-    gain: Complex64,
-    rate: Complex64,
-    /// Largest amplitude, m.
-    largest: f64,
-    /// Standard uncertainties of the rate, rad/s, and of the gain, relative; the latter for white noise of the standard deviation 1 m in the readings, 1/m.
-    u_rate: f64,
-    u_gain: f64,
-    per_noise: f64,
-}
-
-impl<'a> Growth<'a> {
-    /// Of a response with this noise, m, to a base with this phasor, m.
-    fn of(response: &'a Fitted, white: f64, base: Complex64, plan: &Plan) -> Self {
-        let Fitted { found, window: Window { omega, step, .. }, .. } = response;
-        let rate = Complex64::new(0.0, *omega) - found.pole;
-        let steady = found.amplitudes[0];
-        let at = |time: f64| (response.phasor(0) + response.phasor(1) * (-rate * time).exp()).norm();
-        let period = TAU / omega;
-        let sizes = (0..=CHECK_PERIODS[1]).map(|n| at(n as f64 * period));
-        // The gain is proportional to amplitude and rate.
-        let slope = [1.0 / steady, Complex64::ZERO, -1.0 / rate];
-        // The modes of a drawing are not quite those of the rig: what the fit leaves beyond noise does not average out.
-        let degrees = 2.0 * CHECK_PERIODS[1] as f64 - 6.0;
-        let of_noise = white * white * response.window.target.colour(*omega, *step);
-        let explained = of_noise * (1.0 + SIGNIFICANT * (2.0 / degrees).sqrt());
-        let misfit = if plan.beside.is_empty() {
-            0.0
-        } else {
-            (response.variance - explained).max(0.0)
-        };
-        let inflation = (1.0 + misfit / response.variance * CHECK_PERIODS[1] as f64).sqrt();
-        Self {
-            response,
-            gain: response.phasor(0) * rate / base,
-            rate,
-            largest: sizes.fold(0.0, f64::max),
-            u_rate: inflation * response.u(&[Complex64::ZERO, Complex64::ZERO, Complex64::ONE]),
-            u_gain: inflation * response.u(&slope),
-            per_noise: found.u(&slope),
-        }
-    }
-
-    /// The linear response, if its growth is more than noise. `u_base`: relative standard uncertainty of the base.
-    fn linear(&self, u_base: f64, plan: &Plan) -> Option<LinearResponse> {
-        if !(self.gain.norm().is_finite() && self.u_gain < DETERMINED) {
-            return None;
-        }
-        let omega = self.response.window.omega;
-        let is_carried = FRICTION * omega * omega * self.largest < plan.knowledge.carried_up_to;
-        Some(LinearResponse {
-            omega0: self.response.found.pole.norm(),
-            damping_rate: self.rate.re,
-            uncertainty: self.u_rate,
-            gain: self.gain,
-            u_gain: self.u_gain.hypot(u_base),
-            particle: if is_carried {
-                ParticleState::Carried
-            } else {
-                ParticleState::Unknown
-            },
-            shaker: None,
-        })
     }
 }
 

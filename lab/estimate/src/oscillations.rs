@@ -57,64 +57,62 @@ impl Samples<'_> {
         columns
     }
 
-    /// Least squares with these columns: the unknowns and what they leave. `None` where the columns do not determine them.
-    fn solve(columns: &DMatrix<f64>, values: &DVector<f64>) -> Option<(DVector<f64>, DVector<f64>)> {
+    /// Least squares with these columns: the unknowns and what they leave. NaN where the columns do not determine them.
+    fn solve(columns: &DMatrix<f64>, values: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
         let factors = columns.clone().qr();
         let mut right = values.clone();
         factors.q_tr_mul(&mut right);
-        let unknowns = factors
-            .r()
-            .solve_upper_triangular(&right.rows(0, columns.ncols()).into_owned())?;
+        let right = right.rows(0, columns.ncols()).into_owned();
+        let unknowns = factors.r().solve_upper_triangular(&right);
+        let unknowns = unknowns.unwrap_or_else(|| DVector::from_element(columns.ncols(), f64::NAN));
         let rest = values - columns * &unknowns;
-        Some((unknowns, rest))
+        (unknowns, rest)
     }
 
     /// The best oscillations with this pole.
-    fn at(&self, pole: Complex64) -> Option<Oscillations> {
-        let (unknowns, rest) = Self::solve(&self.columns(pole, None), &self.values)?;
-        let amplitude = |n: usize| Complex64::new(unknowns[self.trend + 1 + 2 * n], unknowns[self.trend + 2 + 2 * n]);
-        let amplitudes = (0..=self.known.len()).map(amplitude).collect();
+    fn at(&self, pole: Complex64) -> Oscillations {
+        let (unknowns, rest) = Self::solve(&self.columns(pole, None), &self.values);
+        let pairs = unknowns.as_slice()[self.trend + 1..].chunks_exact(2);
+        let amplitudes = pairs.map(|pair| Complex64::new(pair[0], pair[1])).collect();
         let (covariance, trend) = (DMatrix::zeros(0, 0), self.trend);
-        Some(Oscillations { amplitudes, pole, rest, covariance, trend })
+        Oscillations { amplitudes, pole, rest, covariance, trend }
     }
 }
 
 impl Oscillations {
     /// Of samples `step` seconds apart, the first of which is at the time `first`, s, beside a trend of this degree. `start`: a first value of the
-    /// unknown pole, whose frequency is looked for in quarters of a turn over the record. `None` for samples that are too few, or no numbers.
+    /// unknown pole, whose frequency is looked for in quarters of a turn over the record.
     pub fn new(
         samples: impl IntoIterator<Item = f64>,
         [first, step]: [f64; 2],
         trend: usize,
         known: &[Complex64],
         start: Complex64,
-    ) -> Option<Self> {
+    ) -> Self {
         let values = DVector::from_vec(samples.into_iter().collect());
         let times = (0..values.len()).map(|n| first + n as f64 * step).collect();
         let samples = Samples { values, times, trend, known };
         let quarter = FRAC_PI_2 / (samples.values.len() as f64 * step);
+        let better = |one: Self, other: Self| if other.error() < one.error() { other } else { one };
+        let turned = |n: i32| samples.at(start + Complex64::new(0.0, f64::from(n) * quarter));
         let most = (RANGE * start.im / quarter) as i32;
-        let turned = |n: i32| start + Complex64::new(0.0, f64::from(n) * quarter);
-        let all = (-most..=most).filter_map(|n| samples.at(turned(n)));
-        let mut best = all.min_by(|one, other| one.error().total_cmp(&other.error()))?;
+        let mut best = (-most..=most).map(turned).fold(turned(0), better);
+        let columns = |best: &Self| samples.columns(best.pole, best.amplitudes.last().copied());
         for _ in 0..STEPS {
-            let last = best.amplitudes[known.len()];
-            let columns = samples.columns(best.pole, Some(last));
-            let Some((change, _)) = Samples::solve(&columns, &best.rest) else {
-                break;
-            };
+            let (change, _) = Samples::solve(&columns(&best), &best.rest);
             let n = change.len();
             let next = samples.at(best.pole + Complex64::new(change[n - 2], change[n - 1]));
-            match next {
-                Some(next) if next.error() < best.error() => best = next,
-                _ => break,
+            if next.error() < best.error() {
+                best = next;
+            } else {
+                break;
             }
         }
-        let columns = samples.columns(best.pole, Some(best.amplitudes[known.len()]));
-        let n = columns.ncols();
-        let inverse = columns.qr().r().solve_upper_triangular(&DMatrix::identity(n, n));
+        let factors = columns(&best).qr();
+        let n = factors.r().ncols();
+        let inverse = factors.r().solve_upper_triangular(&DMatrix::identity(n, n));
         best.covariance = inverse.map_or(DMatrix::from_element(n, n, f64::NAN), |r| &r * r.transpose());
-        Some(best)
+        best
     }
 
     /// Sum of the squares of what is left.
@@ -164,7 +162,7 @@ mod tests {
             0.3 - 0.01 * t + (amplitudes[0] * (drive * t).exp() + amplitudes[1] * (mode * t).exp()).im
         };
         let start = Complex64::new(-0.01, 0.95);
-        let found = Oscillations::new((50..2500).map(at), [50.0 * step, step], 1, &[drive], start).unwrap();
+        let found = Oscillations::new((50..2500).map(at), [50.0 * step, step], 1, &[drive], start);
         assert!((found.pole - mode).norm() < 1e-12, "{}", found.pole);
         let errors = found
             .amplitudes
