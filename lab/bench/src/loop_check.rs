@@ -1,23 +1,27 @@
 //! Check of the loop before the drive rises: an open loop at a hundredth of the drive shows what is connected to what. Where the noise of the sensors
 //! leaves the phase uncertain, the drive is raised.
 //!
-//! A linear resonator at rest that is driven at its natural frequency with the amplitude E responds with `-i g E (1 - exp(-d t))/d`
-//! (`g`: half the frequency, `d`: damping rate). Response and base are compared with this and with E, by amplitude and phase.
+//! One model explains the samples of a channel: oscillations, of which one pole is unknown ([`Oscillations`]). The response has the pole of the drive
+//! and that of its mode, whatever its motion was at the start; the base has one pole, whose frequency is that of the clock. With the amplitudes s at
+//! the pole of the drive and x of the base, the mode's gain is `s (i omega - pole)/x`. What the fit leaves is the noise.
+//!
+//! What the fits say stands in two tables, in the order in which a fault hides the next one: quantities with uncertainty, expected value and
+//! tolerance, and [verdicts](Verdict).
 
 mod shaker;
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+use std::f64::consts::{FRAC_PI_4, TAU};
 
-use nalgebra::{DVector, RowVector3, Vector2};
+use nalgebra::Vector2;
 use num_complex::Complex64;
 use phase_lock::Gains;
 use serde::Serialize;
-use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, complex_fit, mean, mean_square, standard_deviation};
+use vines_estimate::Oscillations;
+use vines_model::numerics::{SIGNIFICANT, mean, mean_square, standard_deviation};
 
 use crate::rig::{Drive, Rig, RigError, Scaled};
 use vines_scene::knowledge::Target;
-use vines_scene::linear::LinearResponse;
-use vines_scene::linear::{MeasuredLinear, ParticleState};
+use vines_scene::linear::{LinearResponse, MeasuredLinear, ParticleState};
 use vines_scene::plan::Plan;
 use vines_scene::scene::{Unit, Units};
 
@@ -25,8 +29,8 @@ use vines_scene::scene::{Unit, Units};
 const SHARES: [f64; 2] = [0.01, 0.01 / 16.0];
 /// Factor by which the drive is raised at a time: a fault that noise has hidden is seen at little more.
 const RAISE: f64 = 4.0;
-/// Numbers of periods: without a drive, with it, and evaluated at the end of it.
-const CHECK_PERIODS: [usize; 3] = [2, 24, 4];
+/// Numbers of periods: without a drive, and with it.
+const CHECK_PERIODS: [usize; 2] = [2, 24];
 
 /// Result of the check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -67,16 +71,6 @@ impl LoopCheck {
         );
         !is_certain && SIGNIFICANT * self.u_noise > PHASE.to_radians()
     }
-
-    /// Whether another check is healthy and contradicts each quantity that this one refuses, beyond the uncertainties.
-    fn is_contradicted_by(&self, other: &Self) -> bool {
-        let pairs = self.quantities.iter().zip(&other.quantities);
-        let mut refused = pairs.filter(|(one, _)| one.refusal().is_some()).peekable();
-        let differs = |(one, other): (&CheckedQuantity, &CheckedQuantity)| {
-            (one.measured - other.measured).abs() > SIGNIFICANT * one.uncertainty.hypot(other.uncertainty)
-        };
-        other.verdict == Verdict::Healthy && refused.peek().is_some() && refused.all(differs)
-    }
 }
 
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
@@ -97,13 +91,11 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
         found.verdict,
         Verdict::ResponseLate | Verdict::BaseLate | Verdict::ResponseGain
     );
-    // The response to a check falls to 1 % in five relaxation times; what is left then is noise.
-    let relaxed = (5.0 * plan.knowledge.linear.relaxation_periods() / WAIT as f64).ceil() as usize;
     if plan.knowledge.shaker.is_none() && is_refused {
-        let again = at_share(rig, plan, SHARES[1], MOST_WAITS.min(relaxed))?;
+        let again = at_share(rig, plan, SHARES[1], MOST_WAITS.min(relaxed(plan)))?;
         let periods = found.periods + again.periods;
-        let is_contradicted = found.is_contradicted_by(&again);
-        found = if is_contradicted { again } else { found };
+        let is_healthy = again.verdict == Verdict::Healthy && !again.is_too_weak();
+        found = if is_healthy { again } else { found };
         found.periods = periods;
     }
     while found.is_too_weak() && found.share < most {
@@ -119,114 +111,242 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     })
 }
 
+/// Number of waits in which the response to a check falls to 1 %, in five relaxation times; what is left then is noise.
+fn relaxed(plan: &Plan) -> usize {
+    (5.0 * plan.knowledge.linear.relaxation_periods() / WAIT as f64).ceil() as usize
+}
+
 /// The check at this share of the drive, after `waits` at most.
 fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize) -> Result<LoopCheck, RigError> {
     if let Some(stated) = &plan.knowledge.shaker {
         return shaker::check(rig, plan, stated, share);
     }
-    let (omega, amplitude) = (plan.lock.omega_start, share * plan.amplitude);
-    let step = plan.knowledge.sample_time;
-    let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
-    let [quiet, driven, window] = CHECK_PERIODS.map(samples);
+    let (omega, amplitude, step) = (
+        plan.lock.omega_start,
+        share * plan.amplitude,
+        plan.knowledge.sample_time,
+    );
     let target = plan.knowledge.target;
     let mut rig = Scaled::new(rig, target);
     let mut rig = OpenLoop::new(&mut rig, target, step);
+    let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
+    let [quiet, driven] = CHECK_PERIODS.map(samples);
     let expected = expected(plan).map(|per_drive| per_drive * amplitude);
-    rig.rest(
-        omega,
-        [quiet, samples(WAIT)],
-        waits,
-        expected.map(|phasor| NOISE * phasor.norm()),
-    )?;
+    let enough = expected.map(|phasor| NOISE * phasor.norm());
+    rig.rest(omega, [quiet, samples(WAIT)], waits, enough)?;
     let begins = rig.readings.len();
     rig.drive(driven, omega, amplitude)?;
     let ends = rig.readings.len();
     rig.end(samples(1))?;
-    let OpenLoop { mut readings, has_base, .. } = rig;
-    let periods = readings.len() as f64 / samples(1) as f64;
-    let white = [1, 2].map(|of| noise_of(&readings[begins - quiet..begins], of, &target, step));
-    readings.truncate(ends);
-    without_drift(&mut readings[begins..]);
-    let fits = [1, 2].map(|channel| fitted(&readings[begins + driven - window..], channel, 0, &target, omega));
-    let mut channels = [0, 1].map(|n| {
-        let (phasor, noise) = fits[n];
-        let ratio = phasor / expected[n];
-        let floor = scatter(&readings[begins - quiet..begins], n + 1);
-        let channel = CheckedChannel { noise, floor, ..CheckedChannel::default() };
-        channel.at(ratio, omega * step)
-    });
-    // A delay that looks like the opposite sign is at least this long.
-    let first = (samples(1) as f64 * (PI - IN_TIME) / TAU) as usize;
-    let lead = target.measurands[1].lead();
-    let begin = &readings[begins - quiet..begins + first];
-    let waits = is_late(begin, quiet, channels[1].gain * amplitude, lead);
-    // Without a sensor, the base moves as expected.
-    let (phasor, noise) = fits[1];
-    let base = if has_base {
-        (phasor, noise / phasor.norm() * (2.0 / window as f64).sqrt())
-    } else {
-        (expected[1], 0.0)
+    let periods = rig.readings.len() as f64 / samples(1) as f64;
+    let (quiet, driven) = (&rig.readings[begins - quiet..begins], &rig.readings[begins..ends]);
+    let found = judge([quiet, driven], rig.has_base, amplitude, expected, plan);
+    Ok(LoopCheck { share, periods, ..found })
+}
+
+/// Judges readings without a drive and with it; `expected`: phasors of response and base at the end.
+fn judge(
+    [quiet, driven]: [&[[f64; 3]]; 2],
+    has_base: bool,
+    amplitude: f64,
+    expected: [Complex64; 2],
+    plan: &Plan,
+) -> LoopCheck {
+    let (target, step, omega) = (plan.knowledge.target, plan.knowledge.sample_time, plan.lock.omega_start);
+    let (sine, turn) = (Sine { target, omega, step }, omega * step);
+    // The base may be late by half a period, and reads nothing before.
+    let (onset, after) = driven.split_at(sine.period() / 2);
+    let base = sine.fitted(after, 2, 0.5 * after.len() as f64, 0, &[sine.pole()]);
+    let (phasor, u_base) = match has_base {
+        true => (
+            base.phasor(0),
+            base.u(&[1.0 / base.found.amplitudes[0], Complex64::ZERO]),
+        ),
+        // Without a sensor, the base moves as expected.
+        false => (expected[1], 0.0),
     };
-    let period = samples(1);
-    let readings = &readings[begins..];
-    let phasors = |readings: &[[f64; 3]], channel| by_period(readings, channel, period, &target, omega);
-    let (response, rests) = phasors(readings, 1);
-    let (beside, _) = phasors(&beside_driven_mode(readings, plan, omega, amplitude), 1);
-    let alone: Vec<Complex64> = response.iter().zip(&beside).map(|(z, other)| z - other).collect();
-    let (linear, per_noise) =
-        Linear::of(&alone, mean_square(rests).sqrt(), base, omega, period, plan).unwrap_or((None, 0.0));
-    let u_noise = by_noise(white, per_noise, &expected, window);
+    let late = (plan.lock.delay / step).ceil();
+    let stated = plan.knowledge.linear;
+    let poles = [sine.pole(), Complex64::new(-stated.damping_rate, stated.omega0)];
+    let mode = |readings: &[[f64; 3]], channel| sine.fitted(&readings[late as usize..], channel, -late, 1, &poles);
+    let response = mode(&without_other_modes(driven, plan, omega, amplitude), 1);
+    let white = [1, 2].map(|channel| noise_of(quiet, channel, &target, step));
+    let (linear, per_noise) = growth(&response, white[0], (phasor, u_base), plan);
+    let ends = [response.end(), base.phasor(0)];
+    let noises = [response.noise(), base.noise()];
+    let [mut channel, of_base] = [0, 1].map(|n| {
+        let (noise, floor) = (noises[n], scatter(quiet, n + 1));
+        CheckedChannel { noise, floor, ..CheckedChannel::default() }.at(ends[n] / expected[n], turn)
+    });
     let mut quantities = Vec::new();
     if has_base {
-        quantities.extend(of_base(base, amplitude, &phasors(readings, 2).0, plan));
+        quantities.extend(quantities_of_base(&base, u_base, amplitude, plan));
     }
     if let Some(linear) = &linear {
         // Amplitude and phase of the response for the natural frequency and the damping that the rig has.
-        let (response, reference) = (linear.response, plan.knowledge.numbers.definition.reference);
-        let ratio = response.gain / response.oscillator_gain(omega, reference);
-        channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
-        quantities.extend(of_response(&response, ratio, plan));
+        let reference = plan.knowledge.numbers.definition.reference;
+        let ratio = linear.gain / linear.oscillator_gain(omega, reference);
+        channel = channel.at(ratio * phasor / expected[1], turn);
+        quantities.extend(of_response(linear, ratio, plan));
     }
-    let amplitudes = expected.map(|response| response.norm());
-    let verdict = verdict(&channels, &amplitudes, has_base, waits);
-    let refused = quantities.iter().find_map(CheckedQuantity::refusal);
-    let verdict = refused.filter(|refusal| verdict.may_be(*refusal)).unwrap_or(verdict);
-    Ok(LoopCheck {
-        verdict,
-        linear: linear.filter(|_| verdict == Verdict::Healthy),
+    // Where noise hides the growth, it is at least the error of a phasor.
+    let of_phasor = expected.map(|phasor| (2.0 / driven.len() as f64).sqrt() / phasor.norm());
+    let mut found = LoopCheck {
+        verdict: Verdict::Healthy,
         amplitude,
-        share,
-        periods,
-        response: channels[0],
-        base: has_base.then_some(channels[1]),
+        share: 0.0,
+        periods: 0.0,
+        response: channel,
+        base: has_base.then_some(of_base),
+        linear: None,
         quantities,
-        u_noise,
-    })
+        u_noise: (white[0] * per_noise.max(of_phasor[0])).hypot(white[1] * of_phasor[1]),
+    };
+    // Exchanged channels: the base grows as the response does.
+    let crossed = [
+        response.end() / expected[1],
+        mode(driven, 2).growth() / (stated.gain * expected[1]),
+    ];
+    let waits = [base.is_late(onset, quiet), relaxed(plan) <= MOST_WAITS];
+    found.verdict = found.verdict(&expected.map(|phasor| phasor.norm()), crossed, waits);
+    let linear = linear.filter(|_| found.verdict == Verdict::Healthy);
+    found.linear = linear.map(|response| Linear::new(response, plan));
+    found
 }
 
-/// Whether the base rests in the readings after the first `quiet` ones, although the drive has begun: a delayed base rests, but a base of the opposite
-/// sign moves with this amplitude, m, and this lead, rad.
-fn is_late(readings: &[[f64; 3]], quiet: usize, amplitude: f64, lead: f64) -> bool {
-    let (before, begin) = readings.split_at(quiet);
-    let rest = mean(before.iter().map(|reading| reading[2]));
-    let moved = mean_square(begin.iter().map(|reading| reading[2] - rest));
-    let moves = begin.iter().map(|[phase, ..]| amplitude * (phase + lead).sin());
-    moved < 0.5 * mean_square(moves)
+/// A drive of constant frequency, rad/s.
+#[derive(Clone, Copy)]
+struct Sine {
+    target: Target,
+    omega: f64,
+    step: f64,
 }
 
-/// Standard uncertainty of response over base, relative, and of its phase, rad, by white noise of these standard deviations, m, in both channels;
-/// `per_noise`, 1/m: the part of the growth. Where noise hides the growth, it is at least the error of the phasor of the last `window` samples.
-fn by_noise(white: [f64; 2], per_noise: f64, expected: &[Complex64; 2], window: usize) -> f64 {
-    let of_phasor = expected.map(|phasor| (2.0 / window as f64).sqrt() / phasor.norm());
-    (white[0] * per_noise.max(of_phasor[0])).hypot(white[1] * of_phasor[1])
+impl Sine {
+    fn pole(&self) -> Complex64 {
+        Complex64::new(0.0, self.omega)
+    }
+
+    /// Samples in a period.
+    fn period(&self) -> usize {
+        (TAU / (self.omega * self.step)).round() as usize
+    }
+
+    /// Fits oscillations to the readings of a channel, 1, the response, or 2, the base, beside a trend of this degree. Amplitudes are those at the sample
+    /// `origin`; the last pole is a first value, the others are known.
+    fn fitted(self, readings: &[[f64; 3]], channel: usize, origin: f64, trend: usize, poles: &[Complex64]) -> Fitted {
+        let Self { target, omega, step } = self;
+        let values = readings.iter().map(|reading| reading[channel]);
+        let (start, known) = poles.split_last().unwrap_or((&Complex64::ZERO, &[]));
+        let found = Oscillations::new(values, [-origin * step, step], trend, known, *start);
+        let displacement = target.displacement(channel - 1, omega);
+        let unit = displacement * Complex64::cis(-readings[0][0] - origin * omega * step);
+        let variance = found.variance(omega * step, self.period());
+        Fitted { sine: self, channel, found, unit, variance }
+    }
 }
 
-/// What the drawing's structure adds to the response of its driven mode, from rest, at the phases of these readings: the beat of two modes may last
-/// longer than the check.
-fn beside_driven_mode(readings: &[[f64; 3]], plan: &Plan, omega: f64, amplitude: f64) -> Vec<[f64; 3]> {
+/// The oscillations of a channel.
+struct Fitted {
+    sine: Sine,
+    channel: usize,
+    found: Oscillations,
+    /// What makes a phasor of the displacement of the amplitude of a reading, m.
+    unit: Complex64,
+    /// Variance of the noise about the frequency of the drive, as if it were white.
+    variance: f64,
+}
+
+impl Fitted {
+    /// The displacement that belongs to an amplitude, relative to the drive, m.
+    fn phasor(&self, n: usize) -> Complex64 {
+        self.found.amplitudes[n] * self.unit
+    }
+
+    /// Phasor of a driven mode after some periods, m.
+    fn after(&self, periods: usize) -> Complex64 {
+        let time = periods as f64 * TAU / self.sine.omega;
+        self.phasor(0) + self.phasor(1) * ((self.found.pole - self.sine.pole()) * time).exp()
+    }
+
+    /// This at the end of the check.
+    fn end(&self) -> Complex64 {
+        self.after(CHECK_PERIODS[1])
+    }
+
+    /// Growth rate of a driven mode, m/s, whatever its motion was at the start.
+    fn growth(&self) -> Complex64 {
+        self.phasor(0) * (self.sine.pole() - self.found.pole)
+    }
+
+    /// Standard uncertainty of each component of a sum of amplitudes and the pole.
+    fn u(&self, factors: &[Complex64]) -> f64 {
+        self.variance.sqrt() * self.found.u(factors)
+    }
+
+    /// RMS of everything else, m.
+    fn noise(&self) -> f64 {
+        mean_square(self.found.rest.iter().copied()).sqrt() * self.unit.norm()
+    }
+
+    /// Whether the first readings under the drive, `onset`, are rather those of a channel that still rests, as in `quiet`, than those of this oscillation: a
+    /// delay of half a period looks like the opposite sign.
+    fn is_late(&self, onset: &[[f64; 3]], quiet: &[[f64; 3]]) -> bool {
+        let rest = mean(quiet.iter().map(|reading| reading[self.channel]));
+        let amplitude = self.phasor(0) / self.sine.target.displacement(self.channel - 1, self.sine.omega);
+        let moved = |reading: &[f64; 3]| (amplitude * Complex64::cis(reading[0])).im;
+        let error = |share: f64| mean_square(onset.iter().map(|one| one[self.channel] - rest - share * moved(one)));
+        error(0.0) < error(1.0)
+    }
+}
+
+/// The linear response with this gain on a base with this phasor, m, and relative standard uncertainty, if it is more than noise; and the standard
+/// uncertainty of the gain, relative, for white noise of the standard deviation 1 m in the readings, 1/m. `white`: the noise, m.
+fn growth(
+    response: &Fitted,
+    white: f64,
+    (base, u_base): (Complex64, f64),
+    plan: &Plan,
+) -> (Option<LinearResponse>, f64) {
+    let (found, sine, periods) = (&response.found, response.sine, CHECK_PERIODS[1] as f64);
+    let rate = sine.pole() - found.pole;
+    let gain = response.growth() / base;
+    // The gain is proportional to amplitude and rate.
+    let slope = [1.0 / found.amplitudes[0], Complex64::ZERO, -1.0 / rate];
+    let [u_rate, u_gain] = [[Complex64::ZERO, Complex64::ZERO, Complex64::ONE], slope].map(|one| found.u(&one));
+    // The modes of a drawing are not quite those of the rig: what the fit leaves beyond noise does not average out.
+    let of_noise = white * white * sine.target.colour(sine.omega, sine.step);
+    let explained = of_noise * (1.0 + SIGNIFICANT * (1.0 / (periods - 3.0)).sqrt());
+    let misfit = match plan.beside.is_empty() {
+        true => 0.0,
+        false => (response.variance - explained).max(0.0),
+    };
+    let deviation = (response.variance + misfit * periods).sqrt();
+    let sizes = (0..=CHECK_PERIODS[1]).map(|n| response.after(n).norm());
+    let largest = sine.omega * sine.omega * sizes.fold(0.0, f64::max);
+    let particle = match FRICTION * largest < plan.knowledge.carried_up_to {
+        true => ParticleState::Carried,
+        false => ParticleState::Unknown,
+    };
+    let linear = LinearResponse {
+        omega0: found.pole.norm(),
+        damping_rate: rate.re,
+        uncertainty: deviation * u_rate,
+        gain,
+        u_gain: (deviation * u_gain).hypot(u_base),
+        particle,
+        shaker: None,
+    };
+    let is_determined = gain.norm().is_finite() && deviation * u_gain < DETERMINED;
+    (is_determined.then_some(linear), u_gain)
+}
+
+/// The readings of the response without what the drawing's structure adds to that of its driven mode, from rest: the beat of two modes may last longer
+/// than the check.
+fn without_other_modes(readings: &[[f64; 3]], plan: &Plan, omega: f64, amplitude: f64) -> Vec<[f64; 3]> {
     let (target, step, delay) = (plan.knowledge.target, plan.knowledge.sample_time, plan.lock.delay);
     let (order, begin) = (target.measurands[0].order(), readings[0][0]);
-    let mut beside: Vec<_> = readings.iter().map(|[phase, ..]| [*phase, 0.0, 0.0]).collect();
+    let mut alone = readings.to_vec();
     for (section, pair) in &plan.beside {
         let [x, v] = section.steady(omega).map(|steady| steady * amplitude);
         let started = Vector2::from([x, v].map(|steady| (steady * Complex64::cis(begin)).im));
@@ -234,7 +354,7 @@ fn beside_driven_mode(readings: &[[f64; 3]], plan: &Plan, omega: f64, amplitude:
         if !harmonic.is_finite() {
             continue;
         }
-        for (n, reading) in beside.iter_mut().enumerate() {
+        for (n, reading) in alone.iter_mut().enumerate() {
             let time = n as f64 * step - delay;
             if time < 0.0 {
                 continue;
@@ -245,64 +365,22 @@ fn beside_driven_mode(readings: &[[f64; 3]], plan: &Plan, omega: f64, amplitude:
             }
             let free = section.at(*pair, free)[usize::from(order > 0)];
             let driven = (harmonic * Complex64::cis(begin + omega * time)).im;
-            reading[1] += (driven - free) * target.scale(0);
+            reading[1] -= (driven - free) * target.scale(0);
         }
     }
-    without_drift(&mut beside);
-    beside
+    alone
 }
 
-/// Removes the drift of the response: a particle that flies slowly moves the centre of mass, which looks like a response in every period.
-fn without_drift(readings: &mut [[f64; 3]]) {
-    let half = readings.len() / 2;
-    let [first, second] =
-        [&readings[..half], &readings[half..2 * half]].map(|part| mean(part.iter().map(|reading| reading[1])));
-    let slope = (second - first) / half as f64;
-    for (n, reading) in readings.iter_mut().enumerate() {
-        reading[1] -= slope * n as f64;
-    }
-}
-
-/// Phasors of response and base over the amplitude of the drive, at the end of a check of the scene's linear resonator.
+/// Phasors of response and base over the amplitude of the drive, at the end of a check of the scene's linear resonator: a mode at rest that is driven
+/// at its natural frequency responds with `-i g E (1 - exp(-d t))/d` (`g`: half the frequency, `d`: damping rate).
 fn expected(plan: &Plan) -> [Complex64; 2] {
     let omega = plan.lock.omega_start;
     let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
-    let time = (CHECK_PERIODS[1] as f64 - 0.5 * CHECK_PERIODS[2] as f64) * TAU / omega;
-    let rate = Complex64::new(damping_rate, omega - omega0);
-    let growth = Complex64::new(0.0, -0.5 * omega0) * (1.0 - (-rate * time).exp()) / rate;
+    let turned = Complex64::new(damping_rate, omega - omega0) * (CHECK_PERIODS[1] as f64 * TAU / omega);
+    let growth = plan.knowledge.linear.at(omega) * (1.0 - (-turned).exp());
     // A delay that the chain states is expected.
     let stated = Complex64::from_polar(1.0, -plan.lock.delay * omega);
     [growth * stated, stated]
-}
-
-/// The displacement of a signal at the frequency of the drive, `omega` (rad/s), m, beside an offset that is a polynomial of the degree `trend`, and the
-/// rest of it, RMS; NaN for readings that are no numbers.
-fn fitted(readings: &[[f64; 3]], channel: usize, trend: usize, target: &Target, omega: f64) -> (Complex64, f64) {
-    let displacement = target.displacement(channel - 1, omega);
-    let phases: Vec<f64> = readings.iter().map(|reading| reading[0]).collect();
-    let basis = HarmonicBasis::new(&phases, trend, &[Some(0)]);
-    let values = DVector::from_iterator(readings.len(), readings.iter().map(|reading| reading[channel]));
-    basis
-        .fit(&values)
-        .map_or((Complex64::new(f64::NAN, f64::NAN), f64::NAN), |fit| {
-            let rest = basis.residual(&values, &fit);
-            let rest = mean_square(rest.iter().copied()).sqrt();
-            (fit.harmonic(1) * displacement, rest * displacement.norm())
-        })
-}
-
-/// Phasors of a signal period by period, each of `period` samples, and the rests; as [`fitted`] gives them.
-fn by_period(
-    readings: &[[f64; 3]],
-    channel: usize,
-    period: usize,
-    target: &Target,
-    omega: f64,
-) -> (Vec<Complex64>, Vec<f64>) {
-    let periods = readings.chunks_exact(period);
-    periods
-        .map(|readings| fitted(readings, channel, 0, target, omega))
-        .unzip()
 }
 
 // A rig that is driven with its loop open.
@@ -452,19 +530,15 @@ fn of_response(linear: &LinearResponse, ratio: Complex64, plan: &Plan) -> [Check
     ]
 }
 
-/// Amplitude of the base, whose phasor, m, and its relative uncertainty are given, over the amplitude of the drive, and its frequency from its
-/// phasors, period by period.
-fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], plan: &Plan) -> [CheckedQuantity; 2] {
-    // A delay may shift the beginning by some periods.
-    let last = &periods[periods.len() / 2..];
-    let turned: Complex64 = last.windows(2).map(|pair| pair[0].conj() * pair[1]).sum();
-    let ratio = phasor.norm() / drive;
+/// Frequency of the base, and its amplitude over that of the drive.
+fn quantities_of_base(base: &Fitted, u: f64, drive: f64, plan: &Plan) -> [CheckedQuantity; 2] {
+    let omega = plan.lock.omega_start;
+    let ratio = base.phasor(0).norm() / drive;
     // A controlled base needs no known shaker.
     let controlled = plan.lock.base_bandwidth.is_some();
     let tolerance = if controlled { GAIN - 1.0 } else { FACTOR };
-    // The phases of a window's ends.
-    let u_clock = u * (periods.len() as f64).sqrt() / (TAU * (last.len() as f64 - 1.0));
-    let clock = [1.0 + turned.arg() / TAU, u_clock, 1.0];
+    let u_clock = base.u(&[Complex64::ZERO, Complex64::ONE]) / omega;
+    let clock = [base.found.pole.im / omega, u_clock, 1.0];
     let (name, gain) = ("frequency of the base over that of the drive", [ratio, u * ratio, 1.0]);
     [
         quantity(name, "", clock, CLOCK, Some(Verdict::Clock)),
@@ -587,70 +661,66 @@ pub enum Verdict {
     BaseNoisy,
 }
 
-impl Verdict {
-    /// Whether what the quantities show, `refusal`, may be the reason: phases say nothing where the clocks differ.
-    fn may_be(self, refusal: Self) -> bool {
-        let by_phase = matches!(
-            self,
-            Self::ResponseReversed | Self::BaseReversed | Self::BothReversed | Self::ResponseLate | Self::BaseLate
-        );
-        self == Self::Healthy || by_phase && refusal == Self::Clock
-    }
-}
-
-/// Judges response and base, whose expected amplitudes are `expected`, m. `waits`: the base moves later than the drive, so that its phase is that
-/// of a delay.
-fn verdict(channels: &[CheckedChannel; 2], expected: &[f64; 2], has_base: bool, waits: bool) -> Verdict {
-    let [response, base] = channels;
-    if !(response.gain + base.gain + response.noise + base.noise).is_finite() {
-        return Verdict::NotANumber;
-    }
-    // Amplitudes in the other channel's units: exchanged sensors read each other's signal.
-    let crossed = [
-        response.gain * expected[0] / expected[1],
-        base.gain * expected[1] / expected[0],
-    ];
-    let near = |gain: f64| (1.0 / GAIN..GAIN).contains(&gain);
-    let is_off = |phase: f64, from: f64| (phase.to_radians() - from + PI).rem_euclid(TAU) - PI;
-    let crossed_phases = [is_off(response.phase, FRAC_PI_2), is_off(base.phase, -FRAC_PI_2)];
-    let in_time = |phase: f64| phase.abs() < IN_TIME;
-    let reversed = |channel: &CheckedChannel| in_time(is_off(channel.phase, PI));
-    let noisy = |channel: &CheckedChannel, expected: f64| channel.noise > NOISE * channel.gain * expected;
-    let dead = channels.map(|channel| channel.gain < DEAD);
-    // The response's converter may be too coarse for the motion of the base.
-    let as_base = dead[0] || near(crossed[0]) && in_time(crossed_phases[0]);
-    match () {
-        () if response.floor > (SIGNIFICANT * response.noise).hypot(NOISE * expected[0]) => Verdict::NotAtRest,
-        () if dead[0] && (dead[1] || !has_base) => Verdict::ShakerOff,
-        () if has_base && as_base && near(crossed[1]) && in_time(crossed_phases[1]) => Verdict::Swapped,
-        () if dead[0] => Verdict::ResponseDead,
-        () if has_base && dead[1] => Verdict::BaseDead,
-        // A signal that exceeds the range of its converter is distorted, too.
-        () if has_base && !near(base.gain) => Verdict::BaseGain,
-        () if !near(response.gain) => Verdict::ResponseGain,
-        () if noisy(response, expected[0]) => Verdict::ResponseNoisy,
-        () if has_base && noisy(base, expected[1]) => Verdict::BaseNoisy,
-        () if has_base && !waits && reversed(response) && reversed(base) => Verdict::BothReversed,
-        () if has_base && waits && reversed(base) && in_time(is_off(response.phase - base.phase, 0.0)) => {
-            Verdict::Healthy
-        }
-        () if reversed(response) => Verdict::ResponseReversed,
-        () if has_base && !waits && reversed(base) => Verdict::BaseReversed,
+impl LoopCheck {
+    /// The first fault of the table. `expected`: amplitudes of response and base, m; `crossed`: what each channel is of the other's expected phasor.
+    /// `waits`: the base moves later than the drive, so that its phase is that of a delay. `relaxes`: a free motion of the mode ends in the waits before the
+    /// drive; another one is in the fit.
+    fn verdict(&self, expected: &[f64; 2], crossed: [Complex64; 2], [waits, relaxes]: [bool; 2]) -> Verdict {
+        let (has_base, response) = (self.base.is_some(), self.response);
+        // Without a sensor, the base is as expected.
+        let base = self
+            .base
+            .unwrap_or(CheckedChannel { gain: 1.0, ..CheckedChannel::default() });
+        let is_near = |gain: f64| (1.0 / GAIN..GAIN).contains(&gain);
+        let is_at = |phase: f64, degrees: f64| ((phase - degrees).to_radians().sin_cos().1) > IN_TIME.cos();
+        let is_noisy = |channel: &CheckedChannel, expected: f64| channel.noise > NOISE * channel.gain * expected;
+        let dead = [response, base].map(|channel| channel.gain < DEAD);
+        // Exchanged sensors read each other's signal. The response's converter may be too coarse for the motion of the base.
+        let [is_base, is_response] = crossed.map(|one| is_near(one.norm()) && is_at(one.arg().to_degrees(), 0.0));
         // What delays both, such as a connection, cancels in the phase that the controller holds.
-        () if in_time(is_off(response.phase - if has_base { base.phase } else { 0.0 }, 0.0)) => Verdict::Healthy,
-        () if has_base && !in_time(base.phase.to_radians()) => Verdict::BaseLate,
-        () => Verdict::ResponseLate,
+        let apart = response.phase - base.phase;
+        let base_reversed = !waits && is_at(base.phase, 180.0);
+        let base_in_time = is_at(base.phase, 0.0);
+        let still = (SIGNIFICANT * response.noise).hypot(NOISE * response.gain.max(1.0) * expected[0]);
+        let refuses = |verdict: Verdict| self.quantities.iter().any(|one| one.refusal() == Some(verdict));
+        let late = !is_at(apart, 0.0);
+        let base_gain = !is_near(base.gain) || refuses(Verdict::BaseGain);
+        let response_gain = !is_near(response.gain) || refuses(Verdict::ResponseGain);
+        let numbers = response.gain + base.gain + response.noise + base.noise;
+        let faults = [
+            (Verdict::NotANumber, !numbers.is_finite()),
+            (Verdict::ShakerOff, dead[0] && (dead[1] || !has_base)),
+            (Verdict::Swapped, has_base && (dead[0] || is_base) && is_response),
+            (Verdict::ResponseDead, dead[0]),
+            (Verdict::BaseDead, dead[1]),
+            (
+                Verdict::NotAtRest,
+                relaxes && response.floor > still && (base_gain || response_gain),
+            ),
+            (Verdict::BaseGain, base_gain),
+            (Verdict::BaseNoisy, is_noisy(&base, expected[1])),
+            (Verdict::Clock, refuses(Verdict::Clock)),
+            // A signal that exceeds the range of its converter is distorted, too.
+            (Verdict::ResponseGain, !is_near(response.gain)),
+            (Verdict::ResponseNoisy, is_noisy(&response, expected[0])),
+            (Verdict::BothReversed, base_reversed && is_at(apart, 0.0)),
+            (Verdict::BaseReversed, base_reversed && is_at(apart, 180.0)),
+            (Verdict::ResponseReversed, base_in_time && is_at(apart, 180.0)),
+            (Verdict::BaseLate, late && !base_in_time || refuses(Verdict::BaseLate)),
+            (Verdict::ResponseLate, late || refuses(Verdict::ResponseLate)),
+            (Verdict::ResponseGain, response_gain),
+        ];
+        first_of(&faults)
     }
 }
 
-// The linear response of a rig from its growth in the loop check, and the gains that follow from it.
-//
-// In the n-th period the phasor of the response is `z = s + a q^n` with `q = exp(-r T)`, `r = delta + i (omega - omega_d)` and
-// `s = -i g E/r`, less what the growth within a period adds at twice the frequency, `conj(a q^n) (1 - p)/(1 - p exp(-4 pi i/N))` with
-// `p = exp(-conj(r) T/N)` and N samples per period; it turns against the drive.
-// Least squares over all periods (Gauss and Newton) give `s`, `a` and `q`; `a` is free because of delays and of what was left of an
-// earlier motion. The covariance of the fit gives the uncertainties. The modes of a drawing are not quite those of the rig: beside them, what the
-// residual has beyond the noise within the periods does not average out. The natural frequency is `omega_0 = |omega_d + i delta|`.
+/// The first verdict of a table that holds.
+fn first_of(faults: &[(Verdict, bool)]) -> Verdict {
+    let fault = faults.iter().find(|(_, is)| *is);
+    fault.map_or(Verdict::Healthy, |(verdict, _)| *verdict)
+}
+
+// The linear response of a rig, and the gains that follow from it.
 
 /// The linear response, and the tuning of the loop for it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -701,98 +771,9 @@ impl Linear {
             response,
         }
     }
-
-    /// The response whose phasors, m, are given period by period, each of `samples` samples; `noise` is the RMS of the readings about them, m,
-    /// `base` the phasor of the base, m, and `u_base` its relative standard uncertainty. `None` without a growth from rest that is more than noise.
-    /// And the standard uncertainty of the gain, relative, by white noise of the standard deviation 1 m in the readings, 1/m.
-    fn of(
-        phasors: &[Complex64],
-        noise: f64,
-        (base, u_base): (Complex64, f64),
-        omega: f64,
-        samples: usize,
-        plan: &Plan,
-    ) -> Option<(Option<Self>, f64)> {
-        let step = plan.knowledge.sample_time;
-        let period = samples as f64 * step;
-        // The counter-rotating part turns by this in a period, whose number of samples is rounded.
-        let turn = Complex64::cis(-2.0 * omega * period);
-        let (mut q, [mut steady, mut initial]) = start(phasors)?;
-        let [mut u_q, mut u_gain, mut per_noise] = [f64::NAN; 3];
-        for _ in 0..NEWTON_STEPS {
-            let (mut power, mut turned, mut rest) = (Complex64::ONE, Complex64::ONE, 0.0);
-            let p = q.conj().powf(1.0 / samples as f64);
-            let within = (1.0 - p) / (1.0 - p * Complex64::cis(-4.0 * PI / samples as f64));
-            let rows = phasors.iter().enumerate().map(|(n, z)| {
-                let row = RowVector3::new(Complex64::ONE, power, initial * power / q * n as f64);
-                let residual = z - steady - initial * power + (initial * power).conj() * within * turned;
-                rest += residual.norm_sqr();
-                power *= q;
-                turned *= turn;
-                (row, residual)
-            });
-            let (change, inverse) = complex_fit(rows)?;
-            // Two components of each phasor, and of each of three unknowns.
-            let degrees = 2.0 * phasors.len() as f64 - 6.0;
-            let explained = 2.0 * noise * noise / samples as f64 * (1.0 + SIGNIFICANT * (2.0 / degrees).sqrt());
-            let misfit = match plan.beside.is_empty() {
-                true => 0.0,
-                false => (rest / degrees - explained).max(0.0),
-            };
-            let variance = rest / degrees + misfit * phasors.len() as f64;
-            u_q = (variance * inverse[(2, 2)].re).sqrt();
-            // Relative change of the gain, which is proportional to `s r`.
-            let slope = RowVector3::new(1.0 / steady, Complex64::ZERO, 1.0 / (q * q.ln()));
-            let spread = (slope * inverse * slope.adjoint())[0].re;
-            u_gain = (variance * spread).sqrt();
-            per_noise = (2.0 / samples as f64 * spread).sqrt();
-            (steady, initial, q) = (steady + change[0], initial + change[1], q + change[2]);
-        }
-        let rate = -q.ln() / period;
-        let gain = steady * rate / base;
-        let is_growth = (steady + initial).norm() < FROM_REST * steady.norm();
-        if !(gain.norm().is_finite() && u_gain < DETERMINED && q.norm() > 0.0 && is_growth) {
-            return Some((None, per_noise));
-        }
-        let largest = omega * omega * phasors.iter().map(|z| z.norm()).fold(0.0, f64::max);
-        let particle = match FRICTION * largest < plan.knowledge.carried_up_to {
-            true => ParticleState::Carried,
-            false => ParticleState::Unknown,
-        };
-        let response = LinearResponse {
-            omega0: (omega - rate.im).hypot(rate.re),
-            damping_rate: rate.re,
-            uncertainty: u_q / (q.norm() * period),
-            gain,
-            u_gain: u_gain.hypot(u_base),
-            particle,
-            shaker: None,
-        };
-        Some((Some(Self::new(response, plan)), per_noise))
-    }
 }
 
 /// Largest friction in a drawing over the rig's.
 const FRICTION: f64 = 2.0;
-/// Largest response at the start, as a share of the steady one, of a growth from rest.
-const FROM_REST: f64 = 0.5;
 /// Largest relative standard uncertainty of the gain of a response that is more than noise.
 const DETERMINED: f64 = 0.1;
-/// Number of steps of Newton's method; each squares the relative error.
-const NEWTON_STEPS: usize = 8;
-
-/// First values of `q`, and of `s` and `a`, by the recursion `z' = q z + (1 - q) s` from period to period. `None` without a growth.
-fn start(phasors: &[Complex64]) -> Option<(Complex64, [Complex64; 2])> {
-    let steps = phasors.len().checked_sub(4)? as f64 + 3.0;
-    let (before, after) = (&phasors[..phasors.len() - 1], &phasors[1..]);
-    let mean = |values: &[Complex64]| values.iter().sum::<Complex64>() / steps;
-    let (mean_before, mean_after) = (mean(before), mean(after));
-    let power: f64 = before.iter().map(|z| (z - mean_before).norm_sqr()).sum();
-    let products = before.iter().zip(after);
-    let q = products
-        .map(|(z, next)| (z - mean_before).conj() * next)
-        .sum::<Complex64>()
-        / power;
-    let steady = (mean_after - q * mean_before) / (1.0 - q);
-    (steady.norm().is_finite() && q.norm() > 0.0).then(|| (q, [steady, phasors[0] - steady]))
-}

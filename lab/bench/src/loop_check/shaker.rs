@@ -4,25 +4,25 @@
 //! does, and a parabola with other modes: its root gives natural frequency and damping, and its slope there the gain. `R` over the command shows
 //! the drop-out, and gives the numbers of [`ShakerPath`].
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, RowVector3, Vector3};
 use num_complex::Complex64;
-use vines_model::numerics::complex_fit;
+use vines_model::numerics::{SIGNIFICANT, complex_fit};
 
 use super::{
-    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Linear, LoopCheck, NEWTON_STEPS, NOTED, OpenLoop, PHASE, Verdict,
-    fitted, of_response, quantity,
+    CheckedChannel, CheckedQuantity, DEAD, FACTOR, Fitted, Linear, LoopCheck, NOTED, OpenLoop, PHASE, Sine, Verdict,
+    first_of, noise_of, of_response, quantity,
 };
 use crate::rig::{Rig, RigError, Scaled};
-use vines_scene::linear::LinearResponse;
-use vines_scene::linear::ParticleState;
+use vines_scene::linear::{LinearResponse, ParticleState};
 use vines_scene::plan::Plan;
 use vines_scene::scene::{PLACES, frequencies};
 use vines_scene::shaker_path::ShakerPath;
 
-/// Periods of a window, and most windows at a frequency.
-const STEADY_WINDOW: [usize; 2] = [8, 100];
+/// Periods of a window, and most periods at a frequency.
+const STEADY_WINDOW: usize = 8;
+const MOST_PERIODS: f64 = 800.0;
 /// Largest relative change from window to window of a steady motion.
 const STEADY_CHANGE: f64 = 1e-4;
 
@@ -47,7 +47,7 @@ pub(super) fn check(
         all.push(Steady::of(&mut rig, omega, amplitude)?);
     }
     let samples = window(linear.omega0, plan.knowledge.sample_time);
-    rig.end(samples / STEADY_WINDOW[0])?;
+    rig.end(samples / STEADY_WINDOW)?;
     let near = &all[..PLACES.len()];
     let Steady { both: at, noise, .. } = near[PLACES.len() / 2];
     let curve = Curve::of(near, &linear);
@@ -70,18 +70,18 @@ pub(super) fn check(
     let error = path.error(curve.natural, &values);
     quantities.extend(of_reference(&path, stated, at[1].norm() / amplitude, error));
     let expected = amplitude * (0.5 * linear.omega0 / linear.damping_rate.max(f64::MIN_POSITIVE));
-    let verdict = match () {
-        () if !(at[0] + at[1]).is_finite() => Verdict::NotANumber,
-        () if at[0].norm() < DEAD * expected && at[1].norm() < DEAD * amplitude => Verdict::ShakerOff,
-        () if at[0].norm() < DEAD * expected => Verdict::ResponseDead,
-        () if at[1].norm() < DEAD * amplitude => Verdict::BaseDead,
-        () if ratio.re < 0.0 && ratio.arg().abs() > FRAC_PI_2 => Verdict::ResponseReversed,
-        () if near.iter().any(|one| !one.ratio().is_finite()) => Verdict::NotANumber,
-        () => quantities
-            .iter()
-            .find_map(CheckedQuantity::refusal)
-            .unwrap_or(Verdict::Healthy),
-    };
+    let dead = [at[0].norm() < DEAD * expected, at[1].norm() < DEAD * amplitude];
+    let is_number = |one: &Steady| one.ratio().is_finite();
+    let refusal = quantities.iter().find_map(CheckedQuantity::refusal);
+    let verdict = first_of(&[
+        (Verdict::NotANumber, !(at[0] + at[1]).is_finite()),
+        (Verdict::ShakerOff, dead[0] && dead[1]),
+        (Verdict::ResponseDead, dead[0]),
+        (Verdict::BaseDead, dead[1]),
+        (Verdict::ResponseReversed, ratio.re < 0.0),
+        (Verdict::NotANumber, !near.iter().all(is_number)),
+        (refusal.unwrap_or(Verdict::Healthy), refusal.is_some()),
+    ]);
     let channel = |n: usize, ratio: Complex64| {
         let channel = CheckedChannel { noise: noise[n], ..CheckedChannel::default() };
         channel.at(ratio, linear.omega0 * plan.knowledge.sample_time)
@@ -101,7 +101,7 @@ pub(super) fn check(
 
 /// Samples of a window at a frequency, rad/s.
 fn window(omega: f64, sample_time: f64) -> usize {
-    (STEADY_WINDOW[0] as f64 * TAU / (omega * sample_time)).round() as usize
+    (STEADY_WINDOW as f64 * TAU / (omega * sample_time)).round() as usize
 }
 
 /// What response and reference read at a frequency when they are steady.
@@ -120,33 +120,32 @@ struct Steady {
 impl Steady {
     /// Drives with the frequency `omega`, rad/s, and this amplitude, m.
     fn of(rig: &mut OpenLoop<impl Rig + ?Sized>, omega: f64, amplitude: f64) -> Result<Self, RigError> {
+        let sine = Sine { target: rig.target, omega, step: rig.step };
         let samples = window(omega, rig.step);
-        let (mut last, mut before) = ([Complex64::ZERO; 2], [Complex64::ZERO; 2]);
-        let (mut noise, mut periods) = ([0.0; 2], 0.0);
-        for _ in 0..STEADY_WINDOW[1] {
+        let duration = samples as f64 * rig.step;
+        let mut periods = 0.0;
+        loop {
             rig.readings.clear();
             rig.drive(samples, omega, amplitude)?;
-            periods += STEADY_WINDOW[0] as f64;
+            periods += STEADY_WINDOW as f64;
             // A heavy table on the suspension of a light armature floats for hundreds of periods: a parabola in a window.
-            let both = [1, 2].map(|channel| fitted(&rig.readings, channel, 2, &rig.target, omega));
-            let change = (0..2)
-                .map(|n| (both[n].0 - last[n]).norm() / both[n].0.norm())
-                .fold(0.0, f64::max);
-            (before, last, noise) = (last, both.map(|(phasor, _)| phasor), both.map(|(_, rest)| rest));
-            // A reading that is no number never settles.
-            if change < STEADY_CHANGE || change.is_nan() {
-                break;
+            let both =
+                [1, 2].map(|channel| sine.fitted(&rig.readings, channel, 0.5 * samples as f64, 2, &[sine.pole()]));
+            // What noise makes of a steady motion is no change.
+            let changes = |one: &Fitted| {
+                let noise = noise_of(&rig.readings, one.channel, &rig.target, rig.step);
+                let u = noise * one.found.u(&[Complex64::ZERO, Complex64::ONE]);
+                (one.found.pole - sine.pole()).norm() * duration > STEADY_CHANGE + SIGNIFICANT * u * duration
+            };
+            if !both.iter().any(changes) || periods >= MOST_PERIODS {
+                return Ok(Self {
+                    omega: -Complex64::I * both[0].found.pole,
+                    both: both.each_ref().map(|one| one.phasor(0)),
+                    noise: both.map(|one| one.noise()),
+                    periods,
+                });
             }
         }
-        let middle = [0, 1].map(|n| 0.5 * (before[n] + last[n]));
-        let duration = samples as f64 * rig.step;
-        let growth = (last[0] - before[0]) / (duration * middle[0]);
-        Ok(Self {
-            omega: omega - Complex64::I * growth,
-            both: middle,
-            noise,
-            periods,
-        })
     }
 
     /// Reference over response.
@@ -187,10 +186,9 @@ impl Curve {
         let (found, inverse) = complex_fit(rows.iter().copied().zip(ratios.iter().copied()))
             .unwrap_or_else(|| (Vector3::from_element(nothing), Matrix3::from_element(nothing)));
         let slope_at = |at: Complex64| RowVector3::new(Complex64::ZERO, Complex64::ONE, 2.0 * at);
-        let mut root = -found[0] / found[1];
-        for _ in 0..NEWTON_STEPS {
-            root -= (row(root) * found)[0] / (slope_at(root) * found)[0];
-        }
+        // The root that a straight line has, too.
+        let bent = (1.0 - 4.0 * found[0] * found[2] / (found[1] * found[1])).sqrt();
+        let root = -2.0 * found[0] / (found[1] * (1.0 + bent));
         let rest: f64 = rows
             .iter()
             .zip(&ratios)
@@ -224,39 +222,21 @@ impl Curve {
 
 /// What the shaker makes of its command: `gain`, reference over command at the natural frequency, and the largest relative error of the model of it.
 fn of_reference(path: &ShakerPath, stated: &ShakerPath, gain: f64, error: f64) -> [CheckedQuantity; 4] {
+    let u = |measured: f64| STEADY_CHANGE * measured.abs();
+    let [drop_out, dropped] = [path, stated].map(ShakerPath::drop_out);
+    let [turn, turned] = [path, stated].map(|one| one.turn().to_degrees());
+    let names = [
+        "reference over command at the natural frequency",
+        "drop-out: this over the reference of a structure that does not move",
+        "turn of the reference within the half-power bandwidth",
+        "reference over command, largest relative error of its model",
+    ];
+    let refused = Some(Verdict::ShakerResonance);
+    // All but the last are told, not refused.
     [
-        noted("reference over command at the natural frequency", "", gain, 1.0, FACTOR),
-        noted(
-            "drop-out: this over the reference of a structure that does not move",
-            "",
-            path.drop_out(),
-            stated.drop_out(),
-            FACTOR * stated.drop_out(),
-        ),
-        noted(
-            "turn of the reference within the half-power bandwidth",
-            "degrees",
-            path.turn().to_degrees(),
-            stated.turn().to_degrees(),
-            PHASE,
-        ),
-        quantity(
-            "reference over command, largest relative error of its model",
-            "",
-            [error, STEADY_CHANGE, 0.0],
-            ROBUST,
-            Some(Verdict::ShakerResonance),
-        ),
+        quantity(names[0], "", [gain, u(gain), 1.0], FACTOR, None),
+        quantity(names[1], "", [drop_out, u(drop_out), dropped], FACTOR * dropped, None),
+        quantity(names[2], "degrees", [turn, u(turn), turned], PHASE, None),
+        quantity(names[3], "", [error, STEADY_CHANGE, 0.0], ROBUST, refused),
     ]
-}
-
-/// A quantity that is told, not refused.
-fn noted(name: &'static str, unit: &'static str, measured: f64, expected: f64, tolerance: f64) -> CheckedQuantity {
-    quantity(
-        name,
-        unit,
-        [measured, STEADY_CHANGE * measured.abs(), expected],
-        tolerance,
-        None,
-    )
 }
