@@ -56,6 +56,8 @@ pub struct Level {
     noise: f64,
     /// Prior standard deviation of the components of Lambda1.
     deviations: [f64; 2],
+    /// Largest change of the force by its lag, 1/s.
+    late: f64,
     /// The last of them are the factors of the disturbances.
     unknowns: DVector<f64>,
     disturbances: usize,
@@ -205,10 +207,12 @@ impl Level {
             .zip(moved)
             .map(|(z, by)| z + Complex64::new(by[0], by[1]))
             .collect();
+        let changes = &assumed.changes;
         let level = Self {
             amplitude,
             noise: motion.noise[0] / count as f64,
             deviations: assumed.slope.map(|[_, deviation]| deviation),
+            late: assumed.lag * (changes[count - 1] - changes[0]) / (motion.time[count - 1] - motion.time[0]),
             unknowns,
             disturbances: motion.disturbances.len(),
             covariance,
@@ -244,16 +248,13 @@ impl Level {
             .rows_mut(first, disturbances.len())
             .copy_from_slice(disturbances);
         let variance = weights.dot(&(&self.covariance * &weights));
-        // The product of the errors of slope and amplitude is not linear in the unknowns. A level that rests says nothing of its slope.
-        let slope: f64 = [force.re, force.im]
-            .into_iter()
-            .enumerate()
-            .map(|(part, weight)| {
-                let place = SLOPES + part;
-                weight * weight * (self.unknowns[place].powi(2) + self.deviations[part].powi(2))
-            })
-            .sum();
-        (variance.max(0.0) + slope * self.noise).sqrt() * self.scatter().max(1.0)
+        // The product of the errors of slope and amplitude is not linear in the unknowns: a level that rests says nothing of its slope. What the lag
+        // moves the force by is known to its first order only.
+        let products = [force.re, force.im].into_iter().enumerate().map(|(part, weight)| {
+            let slope = self.unknowns[SLOPES + part].powi(2) + self.deviations[part].powi(2);
+            weight * weight * (slope * self.noise + self.late * self.late)
+        });
+        (variance.max(0.0) + products.sum::<f64>()).sqrt() * self.scatter().max(1.0)
     }
 
     /// Root mean square of the innovations, 1 of noise.

@@ -105,8 +105,9 @@ fn the_uncertainty_is_the_scatter_of_the_force_by_noise_of_response_and_drive() 
     for noise in [[1e-3, 0.0], [1e-3, 1e-2], [1e-4, 1e-2], [1e-5, 1e-3]] {
         for count in [10, 30, 100] {
             let [square, largest, rejected] = of_many(Rig { noise, ..Rig::default() }, count, |_| ());
-            // A slope that is not measured is allowed its prior at all levels, the small ones of a short record as well.
-            assert!((0.7..1.2).contains(&square), "{noise:?} {count}: {square}");
+            // In ten periods noise drifts, and might be a lag.
+            let least = if count == 10 { 0.6 } else { 0.8 };
+            assert!((least..1.2).contains(&square), "{noise:?} {count}: {square}");
             assert!(
                 largest < 7.0 && rejected < 0.01,
                 "{noise:?} {count}: {largest} {rejected}"
@@ -121,7 +122,7 @@ fn a_beat_slower_than_the_record_widens_the_uncertainty_and_does_not_move_the_fo
     let rig = Rig { noise: [1e-4, 0.0], ring: (0.01, pole), ..Rig::default() };
     for count in [10, 20, 60] {
         let [square, largest, rejected] = of_many(rig, count, |motion| motion.rings.push(pole));
-        assert!((0.6..1.4).contains(&square), "{count}: {square}");
+        assert!((0.5..1.4).contains(&square), "{count}: {square}");
         assert!(largest < 7.0 && rejected < 0.02, "{count}: {largest} {rejected}");
         // Without the ring as an unknown, half a beat moves the force unseen; more of it is not white.
         let [square, _, rejected] = of_many(rig, count, |_| ());
