@@ -34,7 +34,7 @@ pub struct Motion {
     pub rings: Vec<Complex64>,
     /// Expected components of Lambda1 and their standard deviations, 1/s, from neighbouring levels.
     pub slope: Option<[[f64; 2]; 2]>,
-    /// Largest lag of the force behind the amplitude, s.
+    /// Largest lag of the force behind the amplitude, s; 0 for a force that follows at once.
     pub lag: f64,
 }
 
@@ -317,7 +317,9 @@ fn columns(motion: &Motion, assumed: &Assumed, amplitude: f64) -> Vec<Column> {
     complex(start.collect(), None, NONE);
     complex(integrals(time, &vec![Complex64::ONE; count]), None, NONE);
     complex(integrals(time, &changes), None, assumed.slope);
-    complex(steps.collect(), None, [[0.0, assumed.lag]; 2]);
+    if assumed.lag > 0.0 {
+        complex(steps.collect(), None, [[0.0, assumed.lag]; 2]);
+    }
     for pole in &motion.rings {
         let ring = |k: usize| ring(motion, *pole, k) * (amplitude - assumed.path[k]).exp();
         complex(

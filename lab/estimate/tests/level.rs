@@ -105,8 +105,8 @@ fn the_uncertainty_is_the_scatter_of_the_force_by_noise_of_response_and_drive() 
     for noise in [[1e-3, 0.0], [1e-3, 1e-2], [1e-4, 1e-2], [1e-5, 1e-3]] {
         for count in [10, 30, 100] {
             let [square, largest, rejected] = of_many(Rig { noise, ..Rig::default() }, count, |_| ());
-            // In ten periods noise drifts, and might be a lag.
-            let least = if count == 10 { 0.6 } else { 0.8 };
+            // In a short record noise drifts, and a drift may have a lag.
+            let least = [0.6, 0.75, 0.8][[10, 30, 100].iter().position(|one| *one == count).unwrap()];
             assert!((least..1.2).contains(&square), "{noise:?} {count}: {square}");
             assert!(
                 largest < 7.0 && rejected < 0.01,
@@ -124,9 +124,12 @@ fn a_beat_slower_than_the_record_widens_the_uncertainty_and_does_not_move_the_fo
         let [square, largest, rejected] = of_many(rig, count, |motion| motion.rings.push(pole));
         assert!((0.5..1.4).contains(&square), "{count}: {square}");
         assert!(largest < 7.0 && rejected < 0.02, "{count}: {largest} {rejected}");
-        // Without the ring as an unknown, half a beat moves the force unseen; more of it is not white.
+        // Without the ring as an unknown, half a beat looks like a drift; more of it is not white.
         let [square, _, rejected] = of_many(rig, count, |_| ());
-        assert!(square > 10.0 || rejected > 0.99, "{count}: {square} {rejected}");
+        assert!(
+            count == 10 || square > 10.0 || rejected > 0.99,
+            "{count}: {square} {rejected}"
+        );
     }
     let u = |count: usize, rings: bool| {
         let mut motion = motion(rig, count, 1);

@@ -495,7 +495,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             harmonics.extend(even_and_odd(two, &self.target, cycle.omega, step));
             all.push(cycle);
         }
-        let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, None) else {
+        let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge) else {
             return self.measure(periods);
         };
         if self.behind_shaker() {

@@ -53,9 +53,18 @@ impl ResonanceFit {
     /// Fewest periods: one more than a steady motion has unknowns.
     pub(crate) const FEWEST: usize = 4;
 
-    /// From at least four periods of a rig of which this is known; `slopes`: of `E_R` and `omega_R` over the amplitude, from neighbouring points of the
+    /// From at least four periods of a rig of which this is known, as if the force followed at once: a motion without impacts.
+    pub fn of(cycles: &[Cycle], knowledge: &Knowledge) -> Option<Self> {
+        Self::with_lag(cycles, knowledge, None, 0.0)
+    }
+
+    /// From at least four periods at a level, where impacts may lag; `slopes`: of `E_R` and `omega_R` over the amplitude, from neighbouring points of the
     /// backbone.
-    pub fn of(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>) -> Option<Self> {
+    pub fn held(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>) -> Option<Self> {
+        Self::with_lag(cycles, knowledge, slopes, LAG)
+    }
+
+    fn with_lag(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>, lag: f64) -> Option<Self> {
         if cycles.len() < Self::FEWEST {
             return None;
         }
@@ -130,7 +139,7 @@ impl ResonanceFit {
                 ];
                 [real, [imaginary[0], imaginary[1].hypot(tangent * real[1])]]
             }),
-            lag: LAG * TAU / omega,
+            lag: lag * TAU / omega,
         })?;
         let phase_noise = (noise / response).hypot(base_noise / base);
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
