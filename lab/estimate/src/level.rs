@@ -76,9 +76,10 @@ const RING: f64 = 1.0;
 const REPEATED: usize = 3;
 /// Standard deviations of normal noise that are exceeded with a probability of 1e-3.
 const SURE: f64 = 3.09;
-/// Places of Lambda0 and of Lambda1 among the unknowns; a complex one has two.
+/// Places of Lambda0, of Lambda1 and of its product with a lag among the unknowns; a complex one has two.
 const FORCE: usize = 2;
 const SLOPES: usize = 4;
+const LAG: usize = 6;
 
 /// How an unknown acts.
 struct Column {
@@ -208,11 +209,17 @@ impl Level {
             .map(|(z, by)| z + Complex64::new(by[0], by[1]))
             .collect();
         let changes = &assumed.changes;
+        // As much as it is found to be, if that is more.
+        let lag = if assumed.lag > 0.0 {
+            assumed.lag.hypot(unknowns[LAG]).hypot(unknowns[LAG + 1])
+        } else {
+            0.0
+        };
         let level = Self {
             amplitude,
             noise: motion.noise[0] / count as f64,
             deviations: assumed.slope.map(|[_, deviation]| deviation),
-            late: assumed.lag * (changes[count - 1] - changes[0]) / (motion.time[count - 1] - motion.time[0]),
+            late: lag * (changes[count - 1] - changes[0]) / (motion.time[count - 1] - motion.time[0]),
             unknowns,
             disturbances: motion.disturbances.len(),
             covariance,

@@ -19,7 +19,7 @@ use nalgebra::Complex;
 use vines_estimate::{Disturbance, Level, Motion};
 use vines_model::numerics::{Estimate, mean, slope};
 
-use super::{Cycle, Unsteady};
+use super::{Cycle, SMALLEST_DISTURBANCE, Unsteady};
 use vines_scene::knowledge::Knowledge;
 use vines_scene::scene::{Definition, Reference, Sensor};
 
@@ -122,7 +122,7 @@ impl ResonanceFit {
             time,
             response: logarithms,
             drive: rates,
-            noise: [noise / response, process].map(|deviation| deviation * deviation),
+            noise: [(noise / response).hypot(SMALLEST_DISTURBANCE), process].map(|deviation| deviation * deviation),
             disturbances,
             rings: knowledge
                 .rings
