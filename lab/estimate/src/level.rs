@@ -127,6 +127,10 @@ impl Level {
                 .zip(&path)
                 .map(|(z, path)| (z - path).exp())
                 .collect();
+            // No ring is larger than the response.
+            if apart.iter().any(|apart| (1.0 / apart - 1.0).norm() > RING) {
+                return None;
+            }
             let largest = [SLOPES, SLOPES + 1].map(|i| level.unknowns[i].hypot(level.covariance[(i, i)].sqrt()));
             let mean = mean_amplitude(&path);
             let assumed = Assumed {

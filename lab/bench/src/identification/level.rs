@@ -1,6 +1,7 @@
 //! When a level is settled: drive and frequency of phase resonance ([`ResonanceFit`]) are known as precisely as the scene asks, from periods whose
 //! innovations are white noise. Noise lengthens the window, and so does a transient that the model does not describe.
 
+use std::cmp::Ordering;
 use std::fmt::{self, Display, Formatter};
 
 use vines_model::numerics::{Estimate, RANDOM};
@@ -78,22 +79,15 @@ pub(crate) fn is_off_target(error: f64, u: f64) -> bool {
 }
 
 impl Criterion {
-    /// From the largest window that noise explains, from the last of these periods backwards, or else from the smallest; `None` for too few.
+    /// The window with the smallest uncertainties, from the last of these periods backwards, of those that noise explains, if any; `None` for too few.
     pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
         let considered = counts.into_iter().filter(|count| *count >= 2 * ResonanceFit::FEWEST);
-        let mut smallest = None;
-        for count in considered {
-            let Some(estimate) = self.of(&cycles[n - count..]) else {
-                continue;
-            };
-            smallest = Some(estimate);
-            if estimate.unsteady.is_none() {
-                break;
-            }
-        }
-        smallest
+        let rank = |estimate: &LevelEstimate| (estimate.unsteady.is_some(), self.size(estimate));
+        considered
+            .filter_map(|count| self.of(&cycles[n - count..]))
+            .min_by(|one, other| rank(one).partial_cmp(&rank(other)).unwrap_or(Ordering::Equal))
     }
 
     /// Whether the uncertainties are small enough, and the phase is near its target.

@@ -53,18 +53,19 @@ impl ResonanceFit {
     /// Fewest periods: one more than a steady motion has unknowns.
     pub(crate) const FEWEST: usize = 4;
 
-    /// From at least four periods of a rig of which this is known, as if the force followed at once: a motion without impacts.
+    /// From at least four periods of a rig of which this is known, as if the force followed at once and nothing rang: the first question to a
+    /// motion, whether it needs impacts.
     pub fn of(cycles: &[Cycle], knowledge: &Knowledge) -> Option<Self> {
-        Self::with_lag(cycles, knowledge, None, 0.0)
+        Self::with(cycles, knowledge, None, false)
     }
 
     /// From at least four periods at a level, where impacts may lag; `slopes`: of `E_R` and `omega_R` over the amplitude, from neighbouring points of the
     /// backbone.
     pub fn held(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>) -> Option<Self> {
-        Self::with_lag(cycles, knowledge, slopes, LAG)
+        Self::with(cycles, knowledge, slopes, true)
     }
 
-    fn with_lag(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>, lag: f64) -> Option<Self> {
+    fn with(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>, is_held: bool) -> Option<Self> {
         if cycles.len() < Self::FEWEST {
             return None;
         }
@@ -118,18 +119,14 @@ impl ResonanceFit {
         }
         let process = if is_measured { gain * base_noise / response } else { 0.0 };
         let mean_before = mean(logarithms.iter().map(|z| z.re));
+        let rings = knowledge.rings.into_iter().flatten().filter(|_| is_held);
         let level = Level::of(&Motion {
             time,
             response: logarithms,
             drive: rates,
             noise: [(noise / response).hypot(SMALLEST_DISTURBANCE), process].map(|deviation| deviation * deviation),
             disturbances,
-            rings: knowledge
-                .rings
-                .into_iter()
-                .flatten()
-                .map(|pole| pole - Complex::new(0.0, omega))
-                .collect(),
+            rings: rings.map(|pole| pole - Complex::new(0.0, omega)).collect(),
             slope: slopes.map(|[by_drive, by_omega]| {
                 let (scale, tangent) = (gain * target.cos(), target.tan());
                 let real = [scale * (base / response - by_drive.value), scale * by_drive.uncertainty];
@@ -139,7 +136,7 @@ impl ResonanceFit {
                 ];
                 [real, [imaginary[0], imaginary[1].hypot(tangent * real[1])]]
             }),
-            lag: lag * TAU / omega,
+            lag: if is_held { LAG * TAU / omega } else { 0.0 },
         })?;
         let phase_noise = (noise / response).hypot(base_noise / base);
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
