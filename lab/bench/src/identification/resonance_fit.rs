@@ -17,7 +17,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use nalgebra::Complex;
 use vines_estimate::{Disturbance, Level, Motion};
-use vines_model::numerics::{Estimate, mean, slope};
+use vines_model::numerics::{Estimate, mean};
 
 use super::{Cycle, SMALLEST_DISTURBANCE, Unsteady};
 use vines_scene::knowledge::Knowledge;
@@ -28,8 +28,6 @@ use vines_scene::scene::{Definition, Reference, Sensor};
 pub struct ResonanceFit {
     /// Mean amplitude of the response, m.
     pub response: Estimate,
-    /// Mean change of the amplitude in a period, m.
-    pub change: f64,
     /// Mean phase error, rad.
     pub phase_error: Estimate,
     /// Scatter of the periods about the fit over the noise of the sensors.
@@ -142,7 +140,6 @@ impl ResonanceFit {
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
             response: of(response * (level.amplitude - mean_before).exp(), noise),
-            change: slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>()),
             phase_error: of(mean(cycles.iter().map(|cycle| cycle.phase_error)), phase_noise),
             excess: level.scatter(),
             level,
