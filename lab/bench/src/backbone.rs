@@ -334,12 +334,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         let [base, omega] = estimate.at;
         let regime = regime_by_response(averaged, knowledge, base, omega);
         let reached = is_reached(estimate.response, level);
-        let [stated_base, stated_omega] = estimate.stated();
         LevelPoint {
-            at: ResonancePoint::new(
-                [estimate.response, stated_base, stated_omega, estimate.phase_error],
-                knowledge,
-            ),
+            at: ResonancePoint::new([estimate.response, base, omega, estimate.phase_error], knowledge),
             // The level as a person would write it.
             level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,

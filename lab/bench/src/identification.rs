@@ -1,6 +1,7 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
 mod asked;
+mod cycle;
 mod decay;
 mod level;
 mod resonance_fit;
@@ -19,11 +20,12 @@ use vines_scene::plan::Plan;
 use vines_scene::scene::{Measurand, Units};
 
 pub(crate) use asked::Departure;
+pub(crate) use cycle::Cycle;
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
 pub(crate) use decay::{Harmonic, PER_PERIOD, base_at_rest, harmonic};
 pub(crate) use level::{Criterion, LevelEstimate, Unsteady};
 pub(crate) use level::{LONGEST_SETTLING, is_off_target};
-pub(crate) use resonance_fit::{Cycle, ResonanceFit};
+pub(crate) use resonance_fit::ResonanceFit;
 pub use response::Tone;
 pub(crate) use response::{
     ASYMMETRIC, Line, classify, degrees, drive_harmonics, foreign_tone, regime_by_response, subharmonic, without_tones,
@@ -296,14 +298,10 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
-    let [stated_base, stated_omega] = level.stated();
     let reference = knowledge.target.units.reference;
     let requested = reference.of_metres(plan.requested(omega.value));
     let [requested_e_m, requested_f_n] = reference.base_or_force(requested);
-    let at = ResonancePoint::new(
-        [level.response, stated_base, stated_omega, phase_error(&held, knowledge)],
-        knowledge,
-    );
+    let at = ResonancePoint::new([level.response, base, omega, phase_error(&held, knowledge)], knowledge);
     Some(Lock {
         at,
         requested_e_m,

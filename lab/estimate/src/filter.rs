@@ -10,13 +10,61 @@ use crate::columns::Columns;
 use crate::record::Record;
 
 /// What the filter does at a period.
-struct Period {
+pub struct Step {
     transition: Matrix2<f64>,
     predicted: Matrix2<f64>,
-    corrected: Matrix2<f64>,
+    /// Covariance of the state after it.
+    pub corrected: Matrix2<f64>,
     gain: Matrix2<f64>,
     /// Makes the innovation one of covariance 1.
     whitening: Matrix2<f64>,
+}
+
+impl Step {
+    /// From the covariance after the period before. `process`: covariance that is added on the way; `noise`: variance of each component of what is
+    /// measured, `None` where the period says nothing.
+    pub fn new(transition: Matrix2<f64>, process: Matrix2<f64>, covariance: Matrix2<f64>, noise: Option<f64>) -> Self {
+        let predicted = transition * covariance * transition.transpose() + process;
+        let (mut gain, mut whitening) = (Matrix2::zeros(), Matrix2::zeros());
+        if let Some(noise) = noise {
+            let innovation = predicted + Matrix2::from_diagonal_element(noise);
+            let lower = innovation.cholesky().map_or(Matrix2::zeros(), |one| one.l());
+            whitening = lower.try_inverse().unwrap_or_default();
+            gain = predicted * whitening.transpose() * whitening;
+        }
+        let corrected = predicted - gain * predicted;
+        let corrected = 0.5 * (corrected + corrected.transpose());
+        Self { transition, predicted, corrected, gain, whitening }
+    }
+
+    /// Moves a state on, and corrects it by the difference `direct` of what is measured from it. Returns the state before the correction and the whitened
+    /// innovation.
+    pub fn advance(
+        &self,
+        state: &mut Vector2<f64>,
+        increment: Vector2<f64>,
+        direct: Vector2<f64>,
+    ) -> [Vector2<f64>; 2] {
+        let predicted = self.transition * *state + increment;
+        let innovation = direct + predicted;
+        *state = predicted - self.gain * innovation;
+        [predicted, self.whitening * innovation]
+    }
+}
+
+/// The backward pass: states from all periods, from those before and after the correction at each.
+pub fn smooth(steps: &[&Step], states: &[[Vector2<f64>; 2]]) -> Vec<Vector2<f64>> {
+    let mut all: Vec<Vector2<f64>> = states.iter().map(|[_, corrected]| *corrected).collect();
+    for k in (1..states.len()).rev() {
+        let back = steps[k - 1].corrected * steps[k].transition.transpose();
+        let back = steps[k]
+            .predicted
+            .try_inverse()
+            .map_or(Matrix2::zeros(), |inverse| back * inverse);
+        let ahead = all[k] - states[k][0];
+        all[k - 1] += back * ahead;
+    }
+    all
 }
 
 /// Variances that a filter is made with.
@@ -30,7 +78,7 @@ pub struct Variances {
 
 /// The filter of a record.
 pub struct Filter {
-    periods: Vec<Period>,
+    periods: Vec<Step>,
     used: Vec<bool>,
     /// Sum of the logarithms of the determinants of the innovations' covariances.
     pub logarithms: f64,
@@ -39,11 +87,13 @@ pub struct Filter {
 /// Variance, over that of the noise, by which a period that is not used lets the state go: 3e4 standard deviations of it.
 const FORGET: f64 = 1e9;
 
-fn rotation(z: Complex64) -> Matrix2<f64> {
+/// The matrix of a complex factor.
+pub fn rotation(z: Complex64) -> Matrix2<f64> {
     Matrix2::new(z.re, -z.im, z.im, z.re)
 }
 
-fn pair(z: Complex64) -> Vector2<f64> {
+/// The components.
+pub fn pair(z: Complex64) -> Vector2<f64> {
     Vector2::new(z.re, z.im)
 }
 
@@ -64,24 +114,18 @@ impl Filter {
             if !used[k] {
                 process += FORGET * noise[k];
             }
-            let predicted = transition * covariance * transition.transpose() + Matrix2::from_diagonal_element(process);
-            let innovation = predicted + Matrix2::from_diagonal_element(variances.measured * noise[k]);
-            let (mut gain, mut whitening) = (Matrix2::zeros(), Matrix2::zeros());
-            if used[k] {
-                let lower = innovation.cholesky().map_or(Matrix2::zeros(), |one| one.l());
-                whitening = lower.try_inverse().unwrap_or_default();
-                gain = predicted * whitening.transpose() * whitening;
-                logarithms += 2.0 * lower.determinant().ln();
-            }
-            let corrected = predicted - gain * predicted;
-            covariance = 0.5 * (corrected + corrected.transpose());
-            Period {
+            let measured = used[k].then_some(variances.measured * noise[k]);
+            let step = Step::new(
                 transition,
-                predicted,
-                corrected: covariance,
-                gain,
-                whitening,
+                Matrix2::from_diagonal_element(process),
+                covariance,
+                measured,
+            );
+            covariance = step.corrected;
+            if used[k] {
+                logarithms -= 2.0 * step.whitening.determinant().ln();
             }
+            step
         };
         let periods = (0..used.len()).map(&mut period).collect();
         Self { periods, used: used.to_vec(), logarithms }
@@ -105,13 +149,9 @@ impl Filter {
                     (_, false) => [&columns.increments, &columns.direct].map(|of| pair(of[k][unknown])),
                     (_, true) => [&columns.increments, &columns.direct].map(|of| pair(Complex64::i() * of[k][unknown])),
                 };
-                *x = period.transition * *x + increment;
+                let [_, innovation] = period.advance(x, increment, direct);
                 if self.used[k] {
-                    let innovation = direct + *x;
-                    white
-                        .fixed_view_mut::<1, 2>(n, row)
-                        .copy_from(&(period.whitening * innovation).transpose());
-                    *x -= period.gain * innovation;
+                    white.fixed_view_mut::<1, 2>(n, row).copy_from(&innovation.transpose());
                 }
             }
             row += if self.used[k] { 2 } else { 0 };
@@ -128,27 +168,17 @@ impl Filter {
         let direct: Vec<Complex64> = columns.direct.iter().map(|row| sum(row)).collect();
         let mut state = Vector2::zeros();
         let mut states = Vec::new();
-        for (k, period) in self.periods.iter().enumerate() {
+        for (k, step) in self.periods.iter().enumerate() {
             let known =
                 pair(sum(&columns.increments[k])) - columns.feedback[k] * pair(columns.path[k.saturating_sub(1)]);
-            let predicted = period.transition * state + known;
-            state = predicted - period.gain * (pair(direct[k] - record.departure[k]) + predicted);
+            let [predicted, _] = step.advance(&mut state, known, pair(direct[k] - record.departure[k]));
             states.push([predicted, state]);
         }
-        let mut smooth = state;
+        let steps: Vec<&Step> = self.periods.iter().collect();
         let mut response = record.periods.response.clone();
-        for k in (0..states.len()).rev() {
-            if k + 1 < states.len() {
-                let next = &self.periods[k + 1];
-                let back = self.periods[k].corrected * next.transition.transpose();
-                let back = next
-                    .predicted
-                    .try_inverse()
-                    .map_or(Matrix2::zeros(), |inverse| back * inverse);
-                smooth = states[k][1] + back * (smooth - states[k + 1][0]);
-            }
+        for (k, state) in smooth(&steps, &states).into_iter().enumerate() {
             if self.used[k] {
-                response[k] = record.periods.linear[k] + Complex64::new(smooth[0], smooth[1]) + direct[k];
+                response[k] = record.periods.linear[k] + Complex64::new(state[0], state[1]) + direct[k];
             }
         }
         response

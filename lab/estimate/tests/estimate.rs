@@ -5,24 +5,14 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use vines_estimate::{Estimate, Immediate, Linear, Periods, Record, Signals, probabilities};
 
+mod common;
+use common::noise;
+
 const SAMPLE_TIME: f64 = 0.01;
 const LINEAR: Linear = Linear { omega0: TAU, zeta: 0.01 };
 
 fn samples(count: usize, value: impl Fn(f64) -> f64) -> Vec<f64> {
     (0..count).map(|k| value(k as f64 * SAMPLE_TIME)).collect()
-}
-
-/// Nearly normal noise of variance 1: sums of twelve numbers of a linear congruence (Numerical Recipes, section 7.1).
-fn noise(seed: u32) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            sum += f64::from(state) / f64::from(u32::MAX);
-        }
-        sum
-    }
 }
 
 #[test]

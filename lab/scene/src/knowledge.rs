@@ -175,6 +175,8 @@ pub struct Knowledge {
     pub nearest_pole: f64,
     /// Periods in which what rings beside the driven mode of a structure falls by a factor of e; 0 without it.
     pub ringing: f64,
+    /// Poles of the other modes of a structure that ring longest in the response, rad/s.
+    pub rings: [Option<Complex64>; 2],
 }
 
 impl Knowledge {
@@ -202,6 +204,7 @@ impl Knowledge {
             shaker: None,
             nearest_pole: f64::INFINITY,
             ringing: 0.0,
+            rings: [None; 2],
         }
     }
 

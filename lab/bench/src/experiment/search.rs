@@ -495,7 +495,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             harmonics.extend(even_and_odd(two, &self.target, cycle.omega, step));
             all.push(cycle);
         }
-        let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge, None) else {
+        let Some(fit) = ResonanceFit::of(&all, &self.bench.plan.knowledge) else {
             return self.measure(periods);
         };
         if self.behind_shaker() {
@@ -531,13 +531,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
             even: squares,
         };
-        self.note(&leg);
+        self.note(&leg, fit.unsteady().is_none());
         Ok(leg)
     }
 
-    /// Notes a leg for the words of a search without a result.
-    fn note(&mut self, leg: &Leg) {
+    /// Notes a leg for the words of a search without a result; one that noise does not explain may resemble impacts.
+    fn note(&mut self, leg: &Leg, is_explained: bool) {
         self.tried = range(self.tried, [leg.response]);
+        if !is_explained {
+            return;
+        }
         self.impacts |= leg.departed;
         if !leg.symmetric {
             return;

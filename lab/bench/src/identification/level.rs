@@ -1,11 +1,7 @@
-//! One level: the window of the fit, and the judge of whether the motion is steady.
-//!
-//! The balances ([`ResonanceFit`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
-//! What is not noise shows as a difference between the two halves of the window beyond their noise; it counts as a part of the
-//! uncertainty. A level is settled when the uncertainties are as small as the scene asks: noise lengthens the window, and so does a
-//! transient.
+//! When a level is settled: drive and frequency of phase resonance ([`ResonanceFit`]) are known as precisely as the scene asks, from periods whose
+//! innovations are white noise. Noise lengthens the window, and so does a transient that the model does not describe.
 
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::cmp::Ordering;
 use std::fmt::{self, Display, Formatter};
 
 use vines_model::numerics::{Estimate, RANDOM};
@@ -37,11 +33,7 @@ pub struct LevelEstimate {
     pub phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
     pub at: [Estimate; 2],
-    /// What no level waits for, in addition to their uncertainties: the phase error where friction or gravity move the fold, and edges of the force of
-    /// a shaker that alias, whose phase is arbitrary.
-    pub added: [f64; 2],
-    /// Why more than noise is larger than the precision; `None` if the fit describes the window, and the systematic part of the uncertainty is
-    /// small enough.
+    /// What in the window is not noise; `None` if the fit describes it.
     pub unsteady: Option<Unsteady>,
 }
 
@@ -50,7 +42,7 @@ pub struct LevelEstimate {
 pub enum Unsteady {
     /// Scatter of the periods over what the noise of the sensors explains; `None` where no balance describes them.
     Scatter(Option<f64>),
-    /// Systematic part of the uncertainty of drive or frequency over what the precision allows.
+    /// Correlation of the residuals of neighbouring periods, over what noise would have.
     Drift(f64),
 }
 
@@ -64,7 +56,7 @@ impl Display for Unsteady {
             ),
             Self::Drift(times) => write!(
                 f,
-                "its drive or frequency drifts {times:.1} times as much as backbone.precision allows"
+                "the residuals of its periods follow from each other, {times:.1} standard deviations of noise: it is modulated, or has not settled"
             ),
         }
     }
@@ -73,10 +65,6 @@ impl Display for Unsteady {
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 near the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const LARGEST_PHASE_ERROR: f64 = 0.02;
-/// Largest delay of the impacts behind a change of the amplitude, periods (studies/tracking.rs).
-pub(crate) const LAG: f64 = 1.6;
-/// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
-const EXCESS: f64 = 2.0;
 /// Relative standard uncertainty of the slope of a straight line through two points: away from the fold the slope changes by less from level to
 /// level.
 const SLOPE: f64 = 0.5;
@@ -91,26 +79,21 @@ pub(crate) fn is_off_target(error: f64, u: f64) -> bool {
 }
 
 impl Criterion {
-    /// The window with the smallest uncertainties, from the last of these periods backwards; `None` for too few.
+    /// The window with the smallest uncertainties, from the last of these periods backwards, of those that noise explains, if any; `None` for too few.
     pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
         let considered = counts.into_iter().filter(|count| *count >= 2 * ResonanceFit::FEWEST);
+        let rank = |estimate: &LevelEstimate| (estimate.unsteady.is_some(), self.size(estimate));
         considered
             .filter_map(|count| self.of(&cycles[n - count..]))
-            .filter(|estimate| {
-                estimate
-                    .at
-                    .iter()
-                    .all(|part| (part.value + part.uncertainty).is_finite())
-            })
-            .min_by(|first, second| self.size(first).total_cmp(&self.size(second)))
+            .min_by(|one, other| rank(one).partial_cmp(&rank(other)).unwrap_or(Ordering::Equal))
     }
 
     /// Whether the uncertainties are small enough, and the phase is near its target.
     pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
         let Estimate { value, uncertainty } = estimate.phase_error;
-        self.size(estimate) <= 1.0 && !is_off_target(value, uncertainty)
+        self.size(estimate) <= 1.0 && estimate.unsteady.is_none() && !is_off_target(value, uncertainty)
     }
 
     /// Largest uncertainty over the largest allowed.
@@ -144,53 +127,20 @@ impl Criterion {
 
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
-        let fit = |cycles: &[Cycle], slopes| ResonanceFit::of(cycles, &self.knowledge, slopes);
-        let whole = fit(cycles, None)?;
+        let fit = |slopes| ResonanceFit::held(cycles, &self.knowledge, slopes);
+        let mut whole = fit(None)?;
         let [base, omega] = whole.at(0.0).map(|value| value.value);
-        let known = self.slopes([whole.response.value, base, omega]);
-        let (first, second) = cycles.split_at(cycles.len() / 2);
-        let (whole, first, second) = (fit(cycles, known)?, fit(first, known)?, fit(second, known)?);
-        let amplitude = whole.response.value;
-        let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
-        let (estimates, own) = (whole.at(0.0), whole.slopes());
-        let slope = |i: usize| {
-            let known = known.map_or(0.0, |slopes| slopes[i].value.abs());
-            own[i].value.abs().max(known).hypot(own[i].uncertainty)
-        };
-        // Systematic errors come from the force of the impacts, a phasor: an error that one balance shows can be hidden in the other.
-        let (units, change) = ([1.0, amplitude / whole.gain], LAG * whole.change);
-        let systematic = [0, 1].map(|i| {
-            let noise = first[i].uncertainty.hypot(second[i].uncertainty);
-            let drift = ((first[i].value - second[i].value).abs() - RANDOM * noise).max(0.0);
-            let late = slope(i) * change;
-            units[i] * drift.hypot(late)
-        });
-        let systematic = systematic[0].hypot(systematic[1]);
-        let at = [0, 1].map(|i| {
-            // The noise of the amplitude moves drive and frequency along their slopes.
-            let aside = slope(i) * whole.u_level;
-            let total = estimates[i];
-            Estimate::new(
-                total.value,
-                &[total.uncertainty, aside, systematic / units[i], whole.remainders[i]],
-            )
-        });
-        let allowed = self.allowed(at[0].value);
-        Some(LevelEstimate {
+        if let Some(known) = self.slopes([whole.response.value, base, omega]) {
+            whole = fit(Some(known))?;
+        }
+        let at = whole.at(0.0);
+        let is_finite = at.iter().all(|part| (part.value + part.uncertainty).is_finite());
+        is_finite.then_some(LevelEstimate {
             periods: cycles.len(),
             response: whole.response,
             phase_error: whole.phase_error,
             at,
-            added: [0, 1].map(|i| {
-                let detuned = slope(i) * whole.remainders[2];
-                let path = self.knowledge.shaker;
-                path.map_or(detuned, |path| detuned.hypot(FRAC_1_SQRT_2 * path.aliased / units[i]))
-            }),
-            unsteady: match systematic / allowed[0].min(units[1] * allowed[1]) {
-                _ if whole.excess > EXCESS => Some(Unsteady::Scatter(Some(whole.excess))),
-                times if times > 1.0 => Some(Unsteady::Drift(times)),
-                _ => None,
-            },
+            unsteady: whole.unsteady(),
         })
     }
 }
@@ -204,13 +154,7 @@ impl LevelEstimate {
             response: mean(&Cycle::amplitude),
             phase_error: mean(&|cycle| cycle.phase_error),
             at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
-            added: [0.0; 2],
             unsteady: Some(Unsteady::Scatter(None)),
         }
-    }
-
-    /// Drive, m, and frequency, rad/s, with all of their uncertainty.
-    pub fn stated(&self) -> [Estimate; 2] {
-        [0, 1].map(|i| Estimate::new(self.at[i].value, &[self.at[i].uncertainty, self.added[i]]))
     }
 }

@@ -254,6 +254,14 @@ impl Structure {
         periods.fold(0.0, f64::max)
     }
 
+    /// Poles of the two modes beside the driven one that ring longest, rad/s.
+    pub fn rings(&self) -> [Option<Complex64>; 2] {
+        let mut others = self.poles();
+        others.drain(..others.len().min(1));
+        others.sort_by(|one, other| other.re.total_cmp(&one.re));
+        [0, 1].map(|n| others.get(n).copied())
+    }
+
     /// What the shaker makes of its command, from the frequency response at the frequencies of the check.
     pub fn shaker_path(&self) -> Option<ShakerPath> {
         let (shaker, mode) = (self.shaker.as_ref()?, self.mode());

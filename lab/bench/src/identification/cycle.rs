@@ -1,0 +1,177 @@
+//! Harmonics of the sensor signals over one period of the drive.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DVector};
+use vines_model::numerics::{HarmonicBasis, mean};
+
+use super::harmonics_of;
+use crate::record::{Sample, drive_phases};
+use vines_scene::knowledge::Target;
+use vines_scene::scene::Measurand;
+
+/// Harmonics of the sensor signals over one period of the drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// Mean time, s.
+    pub time: f64,
+    /// Mean phase of the drive, rad, counted on from period to period.
+    pub drive_phase: f64,
+    /// Mean frequency of the drive, rad/s.
+    pub omega: f64,
+    /// Fundamental of the commanded base motion, m, without noise, or of the measured reference behind a shaker.
+    pub commanded: Complex<f64>,
+    /// Fundamental of the response relative to the drive's phase, m: `Im a exp(i phase)`.
+    pub response: Complex<f64>,
+    /// Fundamental of the base, m: measured if a sensor reads it, otherwise commanded.
+    pub base: Complex<f64>,
+    /// Phase error, rad: response minus base minus target.
+    pub phase_error: f64,
+    /// Variances of the fundamental of response and base by the noise of the sensors, m²: of each of its two components.
+    pub noise: [f64; 2],
+    /// How often the sensor of the response differentiates the displacement.
+    pub order: i32,
+    /// Number of samples.
+    pub samples: usize,
+    /// Their duration, s.
+    pub duration: f64,
+}
+
+/// Harmonics that are fitted to a displacement.
+const HARMONICS: usize = 3;
+
+/// What is fitted to a channel over one period of the drive.
+struct Bases {
+    harmonics: usize,
+    /// Offset and harmonics.
+    basis: HarmonicBasis,
+    /// The first harmonic drifts as well: a change of the amplitude within the period is not noise.
+    drifting: HarmonicBasis,
+}
+
+impl Bases {
+    fn new(phases: &[f64], harmonics: usize) -> Self {
+        let mut degrees = vec![Some(0); harmonics];
+        let basis = HarmonicBasis::new(phases, 0, &degrees);
+        degrees[0] = Some(1);
+        let drifting = HarmonicBasis::new(phases, 0, &degrees);
+        Self { harmonics, basis, drifting }
+    }
+
+    /// The fundamental of a signal, and the variance of each of its components by noise. `coloured`: spectrum of the noise at the fundamental, over its
+    /// mean.
+    fn fundamental(&self, values: &DVector<f64>, coloured: f64) -> Option<(Complex<f64>, f64)> {
+        let fit = self.basis.fit(values)?;
+        let residual = self.drifting.residual(values, &self.drifting.fit(values)?);
+        let variance = residual.norm_squared() / (values.len() - self.drifting.terms()) as f64;
+        Some((fit.harmonic(1), variance * coloured * 2.0 / values.len() as f64))
+    }
+}
+
+impl Cycle {
+    /// The samples of one period; `phase` (rad): phase of the drive at the first, `target`: phase target of the response relative to the base, and
+    /// what both channels measure. `None` for too few samples.
+    pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: Target) -> Option<Self> {
+        // Offset, sine and cosine of the harmonics, and the drift of the first.
+        if samples.len() <= 2 * HARMONICS + 3 {
+            return None;
+        }
+        let phases = drive_phases(samples, sample_time, phase);
+        let mean_omega = mean(samples.iter().map(|s| s.command.drive.omega));
+        let drive_phase = mean(phases.iter().copied());
+        // The response does not follow every change of the drive's frequency: its phase grows uniformly.
+        let middle = 0.5 * (samples.len() - 1) as f64;
+        let uniform: Vec<f64> = (0..samples.len())
+            .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)
+            .collect();
+        let harmonics = |measurand| harmonics_of(measurand, samples.len() as f64, HARMONICS);
+        // Impacts jerk the force of a shaker as they jerk an acceleration.
+        let in_base = if target.through_shaker {
+            harmonics(Measurand::Acceleration)
+        } else {
+            HARMONICS
+        };
+        let in_response = harmonics(target.measurands[0]);
+        let of_base = Bases::new(&uniform, in_base);
+        let of_response = (in_response != in_base).then(|| Bases::new(&uniform, in_response));
+        let Bases { basis, drifting, .. } = &of_base;
+        let fitted = |channel: usize, value: fn(&Sample) -> f64| {
+            let bases = of_response.as_ref().filter(|_| channel == 0).unwrap_or(&of_base);
+            let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
+            // Above many harmonics a sensor shows impacts rather than noise.
+            let least = if bases.harmonics > HARMONICS { 0 } else { HARMONICS };
+            let coloured = target.colour_of_fundamental(mean_omega, sample_time, least);
+            let (fundamental, variance) = bases.fundamental(&values, coloured)?;
+            let displacement = target.displacement(channel, mean_omega);
+            Some((fundamental * displacement, variance * displacement.norm_sqr()))
+        };
+        let (response, noise) = fitted(0, |s| s.sensors.response)?;
+        let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
+        // The amplitude commanded at a sample begins there; a sensor reads what the one before left.
+        let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
+        let motion =
+            |amplitude: &dyn Fn(usize) -> f64| DVector::from_fn(samples.len(), |n, _| amplitude(n) * phases[n].sin());
+        let mut commanded = drifting
+            .fit(&motion(&|n| 0.5 * (before(n) + samples[n].command.drive.amplitude)))?
+            .harmonic(1);
+        let as_read = basis.fit(&motion(&before))?.harmonic(1);
+        let measured = samples.iter().all(|s| s.sensors.reference.is_some());
+        let (base, base_noise) = if measured {
+            let (mut base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
+            match target.through_shaker {
+                true => commanded = base,
+                false => base = base * commanded / as_read,
+            }
+            (base, noise)
+        } else {
+            let base = mean(|s| s.command.drive.amplitude) * target.base_per_sample(mean_omega, sample_time);
+            (Complex::new(base, 0.0), 0.0)
+        };
+        let phase_error = if measured {
+            (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
+        } else {
+            let asked = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.command.drive.displacement));
+            let asked = basis.fit(&asked).map(|fit| fit.harmonic(1));
+            match asked.filter(|asked| *asked != Complex::ZERO) {
+                // The drive of then. (The estimate of a controller is of some periods before.)
+                Some(asked) => {
+                    let late = Complex::from_polar(1.0, mean_omega * target.delay - target.phase);
+                    (response * asked.conj() * late).arg()
+                }
+                // A controller that tells no displacement compensates the delay.
+                None => mean(|s| s.command.phase_error.unwrap_or(0.0)),
+            }
+        };
+        Some(Self {
+            commanded,
+            time: mean(|s| s.time),
+            drive_phase,
+            omega: mean_omega,
+            response,
+            base,
+            phase_error,
+            noise: [noise, base_noise],
+            order: target.measurands[0].order(),
+            samples: samples.len(),
+            duration: samples.len() as f64 * sample_time,
+        })
+    }
+
+    /// The complete periods of the drive in these samples, in order.
+    pub fn all(samples: &[Sample], sample_time: f64, target: Target) -> Vec<Self> {
+        let (mut cycles, mut begin, mut turns, mut phase) = (Vec::new(), 0, 0.0, 0.0);
+        for (n, sample) in samples.iter().enumerate() {
+            turns += sample.command.drive.omega * sample_time / TAU;
+            if turns >= f64::floor(phase) + 1.0 {
+                cycles.extend(Self::of(&samples[begin..=n], sample_time, phase * TAU, target));
+                (begin, phase) = (n + 1, turns);
+            }
+        }
+        cycles
+    }
+
+    /// Amplitude of the response, m.
+    pub fn amplitude(&self) -> f64 {
+        self.response.norm()
+    }
+}

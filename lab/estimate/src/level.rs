@@ -1,0 +1,369 @@
+//! Drive and frequency of phase resonance from periods at about one amplitude: a held level, a leg of a search, a lock.
+//!
+//! The complex amplitude z of the response follows the drive X by
+//!
+//! ```text
+//! z' = g X + Lambda z,    Lambda = Lambda0 + Lambda1 (a + lag a'),    a = ln(|z|/mean |z|),    measured z = z + ring + noise,
+//! ```
+//!
+//! where g is known, and Lambda = `-g E_R/A + i (omega_R - omega of the frame)` is the force of what is inside the rig. Of the logarithm L of z this is
+//! `L' = g X/z + Lambda`, linear in all that is unknown: L at the start, Lambda0, Lambda1, its product with the lag, what disturbs the drive, and an amplitude
+//! for each other mode that rings with its known pole. The path of z is measured; its errors are a state of two real numbers, because X is the same
+//! on the true path: `g X/z` has another value there. A Kalman filter over periods whitens both against noise of response and drive, and least
+//! squares gives the unknowns with their covariance. A second pass runs along the path without the rings, with the slope of the first one.
+
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use num_complex::Complex64;
+
+use crate::filter::{Step, pair, rotation, smooth};
+
+/// Periods of a motion, of about one amplitude.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// Mean times, s.
+    pub time: Vec<f64>,
+    /// Logarithm of the complex amplitude of the response in the frame, with a continuous phase.
+    pub response: Vec<Complex64>,
+    /// What the drive adds to it: `g X/z`, 1/s.
+    pub drive: Vec<Complex64>,
+    /// Variances of each component of the two by noise.
+    pub noise: [f64; 2],
+    /// What disturbs the drive.
+    pub disturbances: Vec<Disturbance>,
+    /// Poles of other modes that may ring in the response, relative to the frame, 1/s.
+    pub rings: Vec<Complex64>,
+    /// Expected components of Lambda1 and their standard deviations, 1/s, from neighbouring levels.
+    pub slope: Option<[[f64; 2]; 2]>,
+    /// Largest lag of the force behind the amplitude, s; 0 for a force that follows at once.
+    pub lag: f64,
+}
+
+/// A part of the drive with an unknown real factor.
+#[derive(Debug, Clone)]
+pub struct Disturbance {
+    /// What a factor of one adds to the drive of each period, 1/s.
+    pub rates: Vec<Complex64>,
+    /// Prior standard deviation of the factor, whose mean is 0.
+    pub deviation: f64,
+}
+
+/// The force of the rig at the mean amplitude.
+#[derive(Debug, Clone)]
+pub struct Level {
+    /// Mean logarithm of the amplitude of the response without rings, to which the force belongs.
+    pub amplitude: f64,
+    /// Variance of that mean by noise.
+    noise: f64,
+    /// Prior standard deviation of the components of Lambda1.
+    deviations: [f64; 2],
+    /// Largest change of the force by its lag, 1/s.
+    late: f64,
+    /// The last of them are the factors of the disturbances.
+    unknowns: DVector<f64>,
+    disturbances: usize,
+    covariance: DMatrix<f64>,
+    /// Whitened innovations, two of each period, of variance 1 if the model describes the periods.
+    innovations: Vec<f64>,
+    /// Sum of squares of the innovations and of the unknowns over their priors, and its degrees of freedom.
+    chi_square: [f64; 2],
+}
+
+/// Standard deviation of the components of Lambda1, over the size of the force: vibro-impact rigs have slopes of `E_R` from -1 to 3 times `E_R/A`.
+const SLOPE: f64 = 3.0;
+/// Standard deviation of a ring over the response: a mode that rings more is the one that is measured.
+const RING: f64 = 1.0;
+/// Passes after the first one, along the path without noise and rings that the one before found.
+const REPEATED: usize = 3;
+/// Standard deviations of normal noise that are exceeded with a probability of 1e-3.
+const SURE: f64 = 3.09;
+/// Places of Lambda0, of Lambda1 and of its product with a lag among the unknowns; a complex one has two.
+const FORCE: usize = 2;
+const SLOPES: usize = 4;
+const LAG: usize = 6;
+
+/// How an unknown acts.
+struct Column {
+    /// On the logarithm, from the period before to each period; on the first one as well.
+    increments: Vec<Complex64>,
+    /// On the measured logarithm alone.
+    direct: Option<Vec<Complex64>>,
+    /// Expected value and its standard deviation.
+    expected: [f64; 2],
+}
+
+/// What a pass assumes.
+struct Assumed {
+    /// Logarithm of the response without rings and noise, what is measured relative to it, and the drive along it.
+    path: Vec<Complex64>,
+    measured: Vec<Complex64>,
+    drive: Vec<Complex64>,
+    /// Logarithm of the amplitude along it, relative to its mean.
+    changes: Vec<f64>,
+    /// Expected components of Lambda1, and their standard deviations.
+    slope: [[f64; 2]; 2],
+    /// Prior standard deviation of its product with the lag.
+    lag: f64,
+}
+
+impl Level {
+    /// From periods; `None` for fewer than three, or where the unknowns cannot be told apart.
+    pub fn of(motion: &Motion) -> Option<Self> {
+        let size = motion.drive.iter().map(|rate| rate.norm()).sum::<f64>() / motion.drive.len() as f64;
+        let slope = motion.slope.unwrap_or([[0.0, SLOPE * size]; 2]);
+        let first = Assumed {
+            path: motion.response.clone(),
+            measured: vec![Complex64::ZERO; motion.response.len()],
+            // Noise of the response would look like a change of the force.
+            changes: vec![0.0; motion.response.len()],
+            drive: motion.drive.clone(),
+            slope,
+            lag: SLOPE * size * motion.lag,
+        };
+        let (mut level, mut path) = Self::pass(motion, &first)?;
+        for _ in 0..REPEATED {
+            let apart: Vec<Complex64> = motion
+                .response
+                .iter()
+                .zip(&path)
+                .map(|(z, path)| (z - path).exp())
+                .collect();
+            // No ring is larger than the response.
+            if apart.iter().any(|apart| (1.0 / apart - 1.0).norm() > RING) {
+                return None;
+            }
+            let largest = [SLOPES, SLOPES + 1].map(|i| level.unknowns[i].hypot(level.covariance[(i, i)].sqrt()));
+            let mean = mean_amplitude(&path);
+            let assumed = Assumed {
+                changes: path.iter().map(|z| z.re - mean).collect(),
+                drive: motion
+                    .drive
+                    .iter()
+                    .zip(&apart)
+                    .map(|(rate, apart)| rate * apart)
+                    .collect(),
+                measured: apart.iter().map(|apart| apart - 1.0).collect(),
+                path,
+                slope,
+                lag: largest[0].hypot(largest[1]) * motion.lag,
+            };
+            (level, path) = Self::pass(motion, &assumed)?;
+        }
+        Some(level)
+    }
+
+    /// The filter and least squares, and the path that they find.
+    fn pass(motion: &Motion, assumed: &Assumed) -> Option<(Self, Vec<Complex64>)> {
+        let count = motion.time.len();
+        let amplitude = mean_amplitude(&assumed.path);
+        let columns = columns(motion, assumed, amplitude);
+        let n = columns.len();
+        let steps = steps(motion, assumed);
+        let known = integrals(&motion.time, &assumed.drive);
+        let mut white = DMatrix::zeros(1 + n, 2 * count);
+        let mut states = DMatrix::zeros(2, 1 + n);
+        let mut history = Vec::new();
+        for (k, (step, implicit)) in steps.iter().enumerate() {
+            let before = assumed.path[k.saturating_sub(1)];
+            let mut predicted = DMatrix::zeros(2, 1 + n);
+            for j in 0..=n {
+                let (increment, direct) = match j.checked_sub(1).map(|j| &columns[j]) {
+                    None => (known[k] + before - assumed.path[k], -assumed.measured[k]),
+                    Some(column) => {
+                        let direct = column.direct.as_ref().map_or(Complex64::ZERO, |of| of[k]);
+                        (column.increments[k], direct)
+                    }
+                };
+                let mut state = states.fixed_view::<2, 1>(0, j).into_owned();
+                let [ahead, innovation] = step.advance(&mut state, implicit * pair(increment), pair(direct));
+                states.set_column(j, &state);
+                predicted.set_column(j, &ahead);
+                white
+                    .fixed_view_mut::<1, 2>(j, 2 * k)
+                    .copy_from(&innovation.transpose());
+            }
+            history.push([predicted, states.clone()]);
+        }
+        // Columns of very different size make the equations ill-conditioned; with a diagonal of 1 they are not.
+        let products = &white * white.transpose();
+        let information = |j: usize| columns[j].expected[1].powi(-2);
+        let expected = |j: usize| columns[j].expected[0];
+        let scale = DVector::from_fn(n, |j, _| (products[(1 + j, 1 + j)] + information(j)).sqrt().recip());
+        let normal = DMatrix::from_fn(n, n, |i, j| {
+            let own = if i == j { information(i) } else { 0.0 };
+            (products[(1 + i, 1 + j)] + own) * scale[i] * scale[j]
+        });
+        let inverse = normal.cholesky()?.inverse();
+        let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let right = DVector::from_fn(n, |j, _| expected(j) * information(j) - products[(1 + j, 0)]);
+        let unknowns = &covariance * right;
+        let innovations = white.row(0).transpose() + white.rows(1, n).tr_mul(&unknowns);
+        let of_priors = (0..n).map(|j| (unknowns[j] - expected(j)).powi(2) * information(j));
+        let free = columns.iter().filter(|column| column.expected[1].is_infinite()).count();
+        let degrees = (2 * count).checked_sub(free).filter(|degrees| *degrees > 0)?;
+        let sum = innovations.norm_squared() + of_priors.sum::<f64>();
+        let weights = unknowns.clone().insert_row(0, 1.0);
+        let found = |of: &DMatrix<f64>| Vector2::from_iterator((of * &weights).iter().copied());
+        let history: Vec<_> = history.iter().map(|states| [0, 1].map(|i| found(&states[i]))).collect();
+        let steps: Vec<&Step> = steps.iter().map(|(step, _)| step).collect();
+        let moved = smooth(&steps, &history);
+        let path = assumed
+            .path
+            .iter()
+            .zip(moved)
+            .map(|(z, by)| z + Complex64::new(by[0], by[1]))
+            .collect();
+        let changes = &assumed.changes;
+        // As much as it is found to be, if that is more.
+        let lag = if assumed.lag > 0.0 {
+            assumed.lag.hypot(unknowns[LAG]).hypot(unknowns[LAG + 1])
+        } else {
+            0.0
+        };
+        let level = Self {
+            amplitude,
+            noise: motion.noise[0] / count as f64,
+            deviations: assumed.slope.map(|[_, deviation]| deviation),
+            late: lag * (changes[count - 1] - changes[0]) / (motion.time[count - 1] - motion.time[0]),
+            unknowns,
+            disturbances: motion.disturbances.len(),
+            covariance,
+            innovations: innovations.as_slice().to_vec(),
+            chi_square: [sum, degrees as f64],
+        };
+        sum.is_finite().then_some((level, path))
+    }
+
+    fn complex(&self, place: usize) -> Complex64 {
+        Complex64::new(self.unknowns[place], self.unknowns[place + 1])
+    }
+
+    /// Lambda at this logarithm of the amplitude, relative to the mean one.
+    pub fn force(&self, ahead: f64) -> Complex64 {
+        self.complex(FORCE) + ahead * self.complex(SLOPES)
+    }
+
+    /// Lambda1.
+    pub fn slope(&self) -> Complex64 {
+        self.complex(SLOPES)
+    }
+
+    /// Standard uncertainty of the sum of the components of Lambda, at a logarithm of the amplitude, with these weights, and of disturbances with these.
+    pub fn uncertainty(&self, ahead: f64, force: Complex64, disturbances: &[f64]) -> f64 {
+        let mut weights = DVector::zeros(self.unknowns.len());
+        for (part, weight) in [force.re, force.im].into_iter().enumerate() {
+            weights[FORCE + part] = weight;
+            weights[SLOPES + part] = ahead * weight;
+        }
+        let first = weights.len() - self.disturbances;
+        weights
+            .rows_mut(first, disturbances.len())
+            .copy_from_slice(disturbances);
+        let variance = weights.dot(&(&self.covariance * &weights));
+        // The product of the errors of slope and amplitude is not linear in the unknowns: a level that rests says nothing of its slope. What the lag
+        // moves the force by is known to its first order only.
+        let products = [force.re, force.im].into_iter().enumerate().map(|(part, weight)| {
+            let slope = self.unknowns[SLOPES + part].powi(2) + self.deviations[part].powi(2);
+            weight * weight * (slope * self.noise + self.late * self.late)
+        });
+        (variance.max(0.0) + products.sum::<f64>()).sqrt() * self.scatter().max(1.0)
+    }
+
+    /// Root mean square of the innovations, 1 of noise.
+    pub fn scatter(&self) -> f64 {
+        (self.chi_square[0] / self.chi_square[1]).sqrt()
+    }
+
+    /// Whether the innovations are as large as noise (chi-square, by Wilson and Hilferty's approximation).
+    pub fn is_noise(&self) -> bool {
+        let [sum, degrees] = self.chi_square;
+        let variance = 2.0 / (9.0 * degrees);
+        (sum / degrees).cbrt() <= 1.0 - variance + SURE * variance.sqrt()
+    }
+
+    /// Correlation of neighbouring periods over what noise would have: beyond [`SURE`], the motion does something else than the model.
+    pub fn correlation(&self) -> f64 {
+        let pairs = self.innovations.iter().zip(&self.innovations[2..]);
+        pairs.map(|(a, b)| a * b).sum::<f64>() / (self.innovations.len() as f64).sqrt()
+    }
+
+    /// Whether the innovations do not follow from each other.
+    pub fn is_white(&self) -> bool {
+        self.correlation().abs() <= SURE
+    }
+}
+
+/// Mean logarithm of the amplitude.
+fn mean_amplitude(path: &[Complex64]) -> f64 {
+    path.iter().map(|z| z.re).sum::<f64>() / path.len() as f64
+}
+
+/// A ring of amplitude one, over the mean amplitude, at a period.
+fn ring(motion: &Motion, pole: Complex64, k: usize) -> Complex64 {
+    (pole * (motion.time[k] - motion.time[0])).exp()
+}
+
+/// Integrals of rates from each period to the next one, and 0 up to the first: the drive of a period is constant.
+fn integrals(time: &[f64], rates: &[Complex64]) -> Vec<Complex64> {
+    let step = |k: usize| 0.5 * (time[k] - time[k - 1]) * (rates[k - 1] + rates[k]);
+    std::iter::once(Complex64::ZERO)
+        .chain((1..time.len()).map(step))
+        .collect()
+}
+
+/// The unknowns in their order.
+fn columns(motion: &Motion, assumed: &Assumed, amplitude: f64) -> Vec<Column> {
+    const NONE: [[f64; 2]; 2] = [[0.0, f64::INFINITY]; 2];
+    let (count, time) = (motion.time.len(), &motion.time);
+    let changes: Vec<Complex64> = assumed.changes.iter().map(|change| (*change).into()).collect();
+    let start = (0..count).map(|k| if k == 0 { Complex64::ONE } else { Complex64::ZERO });
+    let steps = (0..count).map(|k| changes[k] - changes[k.saturating_sub(1)]);
+    let mut columns = Vec::new();
+    let mut complex = |increments: Vec<Complex64>, direct: Option<Vec<Complex64>>, expected: [[f64; 2]; 2]| {
+        for (part, expected) in [Complex64::ONE, Complex64::i()].into_iter().zip(expected) {
+            let turned = |values: &Vec<Complex64>| values.iter().map(|value| part * value).collect();
+            let (increments, direct) = (turned(&increments), direct.as_ref().map(turned));
+            columns.push(Column { increments, direct, expected });
+        }
+    };
+    complex(start.collect(), None, NONE);
+    complex(integrals(time, &vec![Complex64::ONE; count]), None, NONE);
+    complex(integrals(time, &changes), None, assumed.slope);
+    if assumed.lag > 0.0 {
+        complex(steps.collect(), None, [[0.0, assumed.lag]; 2]);
+    }
+    for pole in &motion.rings {
+        let ring = |k: usize| ring(motion, *pole, k) * (amplitude - assumed.path[k]).exp();
+        complex(
+            vec![Complex64::ZERO; count],
+            Some((0..count).map(ring).collect()),
+            [[0.0, RING]; 2],
+        );
+    }
+    columns.extend(motion.disturbances.iter().map(|one| Column {
+        increments: integrals(time, &one.rates),
+        direct: None,
+        expected: [0.0, one.deviation],
+    }));
+    columns
+}
+
+/// The filter at each period, and the matrix by which increments act on its state.
+fn steps(motion: &Motion, assumed: &Assumed) -> Vec<(Step, Matrix2<f64>)> {
+    let feedback = |k: usize| -rotation(assumed.drive[k]);
+    let mut covariance = Matrix2::zeros();
+    let step = |k: usize| {
+        let (mut transition, mut implicit, mut process) = (Matrix2::identity(), Matrix2::identity(), Matrix2::zeros());
+        if k > 0 {
+            let half = 0.5 * (motion.time[k] - motion.time[k - 1]);
+            implicit = (Matrix2::identity() - feedback(k) * half)
+                .try_inverse()
+                .unwrap_or_default();
+            transition = implicit * (Matrix2::identity() + feedback(k - 1) * half);
+            process = implicit * implicit.transpose() * (motion.noise[1] * 4.0 * half * half);
+        }
+        let step = Step::new(transition, process, covariance, Some(motion.noise[0]));
+        covariance = step.corrected;
+        (step, implicit)
+    };
+    (0..motion.time.len()).map(step).collect()
+}
