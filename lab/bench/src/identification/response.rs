@@ -30,7 +30,7 @@ const LINES: usize = 8;
 const SIGNIFICANT_HARMONIC: f64 = 4.0;
 /// Smallest even harmonic of an asymmetric motion, over the larger odd one next to it: of the second over the third, symmetric motions have about
 /// 0.01, irregular ones 2 and more.
-pub(crate) const ASYMMETRIC: f64 = 0.5;
+const ASYMMETRIC: f64 = 0.5;
 /// Harmonics that are fitted to a displacement.
 const RESPONSE_HARMONICS: usize = 5;
 
@@ -38,7 +38,7 @@ const RESPONSE_HARMONICS: usize = 5;
 const ALL_HARMONICS: Measurand = Measurand::Acceleration;
 
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
-pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
+fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
     let count = harmonics_of(measurand, samples_per_period, RESPONSE_HARMONICS);
     [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
 }
@@ -178,7 +178,7 @@ pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64
 }
 
 /// These samples without the foreign tones in their response; `None` if there are none.
-pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
+fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
     let tones = Content::of(samples, knowledge, omega, 0, knowledge.target.measurands[0])?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
