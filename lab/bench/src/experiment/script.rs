@@ -19,9 +19,11 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, range};
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, SearchFound, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, is_another, regime_by_response,
+    regime_on_the_way,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
 use vines_scene::knowledge::Knowledge;
+use vines_scene::linear::POINT_RESOLUTION;
 use vines_scene::shaker_path::{BANDWIDTH, ShakerPath};
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.
@@ -40,7 +42,8 @@ const DRAWING: f64 = 0.1;
 const RESPONSES: [f64; 2] = [1.5, 0.05];
 /// Smallest ratio of the setpoint to a response that follows it.
 const FOLLOWS: f64 = 0.8;
-/// Levels that bring the drive of a lock as near to the requested one as the scene's precision, before any within the limits of a lock is taken.
+/// Levels that bring the drive of a lock to the requested one within its uncertainty, before any within the limits of a lock is taken: each reduces the
+/// error to the share by which the slope is wrong.
 const PRECISE_LEVELS: usize = 3;
 
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
@@ -120,7 +123,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// Goes to a symmetric motion with impacts, if there is one, and holds its response.
     pub fn impacts(&mut self) -> Result<Leg, ExperimentError> {
         let leg = self.begin()?;
-        self.symmetric(leg)
+        self.symmetric(leg, LEG_CHANGE)
     }
 
     /// The lock with the response under control; false if the controller cannot control it.
@@ -140,22 +143,25 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         }
     }
 
-    /// Goes to the requested drive: from where the motion is, and if it is not passed there, from the largest symmetric motion downwards.
+    /// Goes to the requested drive: from where the motion is, and if it is not reached there, from the largest symmetric motion downwards in smaller legs.
     fn reach(&mut self, mut leg: Leg) -> Result<(), ExperimentError> {
-        for _ in 0..2 {
-            leg = self.symmetric(leg)?;
-            let mut upwards = leg.drive < self.requested;
+        for step in [LEG_CHANGE, 0.5 * LEG_CHANGE] {
+            leg = self.symmetric(leg, step)?;
+            let mut step = if leg.drive < self.requested { step } else { -step };
             while self.is_symmetric(leg.regime) && self.setpoint > RESPONSES[1] * self.b {
                 let before = leg;
-                leg = self.sweep(&leg, upwards)?;
+                leg = self.sweep(&leg, step)?;
                 if !self.is_symmetric(leg.regime) {
                     // A change may disturb the symmetry for a while.
                     leg = self.leg(0.0, FOLLOWED, 0.0)?;
                 }
+                // The drive of the next leg, if it goes on like this.
+                let next = 2.0 * leg.drive - before.drive;
                 if !self.is_symmetric(leg.regime) {
                     // Above the symmetric motion is one without symmetry, which may go on far below.
-                    (leg, upwards) = (self.fall(leg)?, false);
-                } else if (before.drive - self.requested) * (leg.drive - self.requested) <= 0.0 {
+                    step = -step.abs();
+                    leg = self.fall(leg, step)?;
+                } else if (before.drive - self.requested) * (next - self.requested) <= 0.0 {
                     if self.secant([before, leg])? {
                         return Ok(());
                     }
@@ -243,7 +249,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     }
 
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
-    fn symmetric(&mut self, mut leg: Leg) -> Result<Leg, ExperimentError> {
+    fn symmetric(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         while !(has_impacts(leg.regime) && leg.response > (1.0 - DRAWING) * self.b) {
             if self.is_symmetric(leg.regime) {
                 // A rise may resemble impacts; at rest the setpoint tells them apart.
@@ -259,18 +265,18 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             let change = (self.b / RISE).min(0.5 * MOVE_SHARE * PI * spare) * FOLLOWED as f64;
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, change / FOLLOWED as f64)?;
         }
-        self.fall(leg)
+        self.fall(leg, -step)
     }
 
     /// Lowers the response as long as it follows, until the motion is symmetric, but not on after impacts have ended. A large response can hide them:
     /// beside a carried particle, their evidence grows as the response falls.
-    fn fall(&mut self, mut leg: Leg) -> Result<Leg, ExperimentError> {
+    fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let mut seen = has_impacts(leg.regime);
         while !self.is_symmetric(leg.regime)
             && !(seen && leg.regime == Regime::NoImpacts)
             && self.setpoint > (RESPONSES[1] * self.b).max(FOLLOWS * leg.last)
         {
-            leg = self.sweep(&leg, false)?;
+            leg = self.sweep(&leg, step)?;
             seen |= has_impacts(leg.regime);
         }
         Ok(leg)
@@ -294,7 +300,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             }
             let next = [estimate.response.value, estimate.at[0].value];
             let noise = SIGNIFICANT * estimate.at[0].uncertainty;
-            let is_near = (next[1] - self.requested).abs() < noise.max(self.run.plan.precision * self.requested);
+            let is_near = (next[1] - self.requested).abs() < noise.max(POINT_RESOLUTION * self.requested);
             if is_near || count >= PRECISE_LEVELS && !self.is_another(&estimate) {
                 return Ok(true);
             }
@@ -455,9 +461,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         of_shaker.unwrap_or(f64::INFINITY).min(of_controller)
     }
 
-    /// A leg up or down, which lets the change go on at its rate.
-    fn sweep(&mut self, leg: &Leg, upwards: bool) -> Result<Leg, ExperimentError> {
-        let change = LEG_CHANGE * leg.last * if upwards { 1.0 } else { -1.0 };
+    /// A leg by a share of the response, which lets the change go on at its rate.
+    fn sweep(&mut self, leg: &Leg, share: f64) -> Result<Leg, ExperimentError> {
+        let change = share * leg.last;
         let periods = FOLLOWED.max(self.periods(change, leg.last + change, leg.drive).ceil() as usize);
         self.leg(change, periods, change / periods as f64)
     }
@@ -490,7 +496,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             last: cycles[cycles.len() - 1].amplitude(),
             drive: drive.value,
             omega: omega.value,
-            regime: regime_by_response(samples, self.knowledge, drive, omega),
+            regime: regime_on_the_way(samples, self.knowledge, drive, omega),
         };
         self.note(&leg);
         Ok(leg)

@@ -255,12 +255,22 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
 pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    let Some(content) = Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) else {
-        return Regime::Unknown;
-    };
-    if content.is_irregular() {
-        return Regime::Other;
+    match Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) {
+        None => Regime::Unknown,
+        Some(content) if content.is_irregular() => Regime::Other,
+        Some(content) => regime_of(&content, samples, knowledge, base, omega),
     }
+}
+
+/// [`regime_by_response`] of a motion that a loop moves: what its harmonics do not describe is the way, and not irregular.
+pub(crate) fn regime_on_the_way(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
+    let content = Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS);
+    content.map_or(Regime::Unknown, |content| {
+        regime_of(&content, samples, knowledge, base, omega)
+    })
+}
+
+fn regime_of(content: &Content, samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
     let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
     let target = knowledge.target;
     let coloured = target.colour(omega.value, knowledge.sample_time);
@@ -278,14 +288,20 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
         uncertainty: force(content.errors[1]),
     };
     let significant = SIGNIFICANT_HARMONIC * content.errors[1];
-    let impacts = match is_known {
+    let by_resonance = match is_known {
         true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
-        false if third_harmonic > significant => impacts_by_harmonic(third, epsilon),
         false => Impacts::Doubtful,
     };
+    // Where the resonance does not tell, a third harmonic may.
+    let impacts = match by_resonance {
+        Impacts::Doubtful if third_harmonic > significant && impacts_by_harmonic(third, epsilon) == Impacts::Needed => {
+            Impacts::Needed
+        }
+        by_resonance => by_resonance,
+    };
     match impacts {
-        Impacts::NotNeeded if is_known => Regime::NoImpacts,
-        Impacts::NotNeeded | Impacts::Doubtful => Regime::NotEstablished,
+        Impacts::NotNeeded => Regime::NoImpacts,
+        Impacts::Doubtful => Regime::NotEstablished,
         Impacts::Needed if content.is_asymmetric(target.measurands[0].order()) => Regime::Asymmetric,
         Impacts::Needed if is_asymmetric_by_reference(samples, knowledge, omega.value) => Regime::Asymmetric,
         Impacts::Needed if third_harmonic > significant => Regime::Symmetric,

@@ -679,7 +679,6 @@ fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
 }
 
 #[test]
-#[ignore = "a leg of the search can need a drive below zero, until the one estimator replaces the search"]
 fn a_refusal_names_no_drive_below_zero() {
     let found = SearchFound {
         tried: [0.1, 0.5],
@@ -687,8 +686,7 @@ fn a_refusal_names_no_drive_below_zero() {
         held: Some(([-0.2017, 0.9], [0.9, 0.4, -1.0])),
         strongest: 4.4,
         requested: 1.1,
-        lost: 4,
-        unsettled: None,
+        late: false,
         silent: None,
     };
     assert!(!found.to_string().contains("G = -"), "{found}");
