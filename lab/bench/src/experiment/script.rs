@@ -148,24 +148,28 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         for step in [LEG_CHANGE, 0.5 * LEG_CHANGE] {
             leg = self.symmetric(leg, step)?;
             let mut step = if leg.drive < self.requested { step } else { -step };
+            let mut steepness = 1.0;
             while self.is_symmetric(leg.regime) && self.setpoint > RESPONSES[1] * self.b {
                 let before = leg;
-                leg = self.sweep(&leg, step)?;
+                leg = self.sweep(&leg, step / steepness)?;
                 if !self.is_symmetric(leg.regime) {
                     // A change may disturb the symmetry for a while.
                     leg = self.leg(0.0, FOLLOWED, 0.0)?;
                 }
+                steepness = self.steepness([before, leg]);
                 // The drive of the next leg, if it goes on like this.
                 let next = 2.0 * leg.drive - before.drive;
+                let passes = (before.drive - self.requested) * (next - self.requested) <= 0.0;
+                if self.is_symmetric(leg.regime) && passes {
+                    if self.secant([before, leg], step.abs() / steepness)? {
+                        return Ok(());
+                    }
+                    leg = self.leg(0.0, FOLLOWED, 0.0)?;
+                }
                 if !self.is_symmetric(leg.regime) {
                     // Above the symmetric motion is one without symmetry, which may go on far below.
                     step = -step.abs();
                     leg = self.fall(leg, step)?;
-                } else if (before.drive - self.requested) * (next - self.requested) <= 0.0 {
-                    if self.secant([before, leg])? {
-                        return Ok(());
-                    }
-                    leg = self.leg(0.0, FOLLOWED, 0.0)?;
                 }
             }
         }
@@ -206,7 +210,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             cycles.drain(..cycles.len().saturating_sub(LONGEST_SETTLING));
             let criterion = self.criterion();
             let estimate = criterion.best(&cycles).filter(|one| is_judged && criterion.is_met(one));
-            let is_settled = estimate.is_some_and(|one| !self.is_another(&one));
+            let is_settled = estimate.is_some_and(|one| !self.is_another(&one) && self.is_in_phase(&one));
             confirmed = if is_settled { confirmed + 1 } else { 0 };
         }
         Ok(())
@@ -282,13 +286,22 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         Ok(leg)
     }
 
-    /// Holds levels by the secant method until the requested drive holds the response. Returns false if the motion is lost.
-    fn secant(&mut self, [before, leg]: [Leg; 2]) -> Result<bool, ExperimentError> {
+    /// Change of the drive, or of the frequency over the half-power bandwidth E/A, over that of the response between two legs, relative; at least 1. Near the
+    /// fold both change much faster than the response.
+    fn steepness(&self, [before, leg]: [Leg; 2]) -> f64 {
+        let turned = (leg.omega - before.omega) / self.knowledge.linear.omega0 * leg.response;
+        let changed = (leg.drive - before.drive).abs().max(turned.abs()) / leg.drive;
+        (changed / (leg.response / before.response - 1.0)).abs().max(1.0)
+    }
+
+    /// Holds levels by the secant method, in steps of this share of the response at most, until the requested drive holds the response at the phase
+    /// target. Returns false if the motion is lost.
+    fn secant(&mut self, [before, leg]: [Leg; 2], step: f64) -> Result<bool, ExperimentError> {
         let mut slope = (leg.drive - before.drive) / (leg.response - before.response);
         let mut at = [leg.response, leg.drive];
         for count in 0.. {
             let change = (self.requested - at[1]) / slope;
-            let largest = LEG_CHANGE * at[0];
+            let largest = step * at[0];
             let criterion = self.criterion();
             let Level { estimate, cycles } = self.hold(at[0] + change.clamp(-largest, largest), &criterion)?;
             if !self.is_symmetric(self.regime(&estimate, &cycles)) {
@@ -301,7 +314,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             let next = [estimate.response.value, estimate.at[0].value];
             let noise = SIGNIFICANT * estimate.at[0].uncertainty;
             let is_near = (next[1] - self.requested).abs() < noise.max(POINT_RESOLUTION * self.requested);
-            if is_near || count >= PRECISE_LEVELS && !self.is_another(&estimate) {
+            let is_near = is_near || count >= PRECISE_LEVELS && !self.is_another(&estimate);
+            if is_near && self.is_in_phase(&estimate) {
                 return Ok(true);
             }
             // Between near levels, noise can be larger than what changes.
@@ -317,6 +331,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     fn is_another(&self, estimate: &LevelEstimate) -> bool {
         let Estimate { value, uncertainty } = estimate.at[0];
         is_another(value - self.requested, uncertainty, self.requested)
+    }
+
+    /// Whether the phase is as near to its target as a lock must be.
+    fn is_in_phase(&self, estimate: &LevelEstimate) -> bool {
+        let Estimate { value, uncertainty } = estimate.phase_error;
+        value.abs() <= self.run.plan.lock.lock.phase_tolerance.max(SIGNIFICANT * uncertainty)
     }
 
     /// What is asked of a level on its own.
