@@ -14,12 +14,12 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
-use vines_model::numerics::{Estimate, SIGNIFICANT, range};
+use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, SearchFound, Stage};
 use crate::identification::{
-    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, is_another, regime_by_response,
-    regime_on_the_way,
+    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, Unsteady, is_another, regime_by_response,
+    regime_on_the_way, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
 use vines_scene::knowledge::Knowledge;
@@ -40,6 +40,8 @@ const RISE: f64 = 60.0;
 const DRAWING: f64 = 0.1;
 /// Largest and smallest response of the script over the half-width: a particle that moves freely has hit the walls, and the fold of r = 0.85 is larger.
 const RESPONSES: [f64; 2] = [1.5, 0.05];
+/// Largest such steepness that legs follow: with less than half a percent, the loops' own transients would count as a change.
+const STEEPEST: f64 = 10.0;
 /// Smallest ratio of the setpoint to a response that follows it.
 const FOLLOWS: f64 = 0.8;
 /// Levels that bring the drive of a lock to the requested one within its uncertainty, before any within the limits of a lock is taken: each reduces the
@@ -143,9 +145,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         }
     }
 
-    /// Goes to the requested drive: from where the motion is, and if it is not reached there, from the largest symmetric motion downwards in smaller legs.
+    /// Goes to the requested drive: from where the motion is to where a constant drive would hold it, too, as it rises with the response; or else from the
+    /// largest symmetric motion downwards, in smaller legs, to any.
     fn reach(&mut self, mut leg: Leg) -> Result<(), ExperimentError> {
-        for step in [LEG_CHANGE, 0.5 * LEG_CHANGE] {
+        for (step, is_last) in [(LEG_CHANGE, false), (0.5 * LEG_CHANGE, true)] {
             leg = self.symmetric(leg, step)?;
             let mut step = if leg.drive < self.requested { step } else { -step };
             let mut steepness = 1.0;
@@ -160,7 +163,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
                 // The drive of the next leg, if it goes on like this.
                 let next = 2.0 * leg.drive - before.drive;
                 let passes = (before.drive - self.requested) * (next - self.requested) <= 0.0;
-                if self.is_symmetric(leg.regime) && passes {
+                let rises = (leg.drive - before.drive) * (leg.response - before.response) > 0.0;
+                if self.is_symmetric(leg.regime) && passes && (rises || is_last) {
                     if self.secant([before, leg], step.abs() / steepness)? {
                         return Ok(());
                     }
@@ -291,7 +295,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     fn steepness(&self, [before, leg]: [Leg; 2]) -> f64 {
         let turned = (leg.omega - before.omega) / self.knowledge.linear.omega0 * leg.response;
         let changed = (leg.drive - before.drive).abs().max(turned.abs()) / leg.drive;
-        (changed / (leg.response / before.response - 1.0)).abs().max(1.0)
+        (changed / (leg.response / before.response - 1.0))
+            .abs()
+            .clamp(1.0, STEEPEST)
     }
 
     /// Holds levels by the secant method, in steps of this share of the response at most, until the requested drive holds the response at the phase
@@ -307,7 +313,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             if !self.is_symmetric(self.regime(&estimate, &cycles)) {
                 return Ok(false);
             }
-            if let Some(why) = estimate.unsteady.filter(|_| !criterion.is_met(&estimate)) {
+            // What drifts only has a larger uncertainty.
+            let is_irregular = |why: &Unsteady| matches!(why, Unsteady::Scatter(_)) && !criterion.is_met(&estimate);
+            if let Some(why) = estimate.unsteady.filter(is_irregular) {
                 let response = self.knowledge.target.units.response.quantity(estimate.response.value);
                 return Err(ExperimentError::NotSteady { periods: cycles.len(), response, why });
             }
@@ -501,22 +509,35 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         self.measure(periods)
     }
 
-    /// Measures over `periods`.
+    /// Measures over `periods`, without foreign tones, which disturb so few periods.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
-        let cycles = (0..periods.max(ResonanceFit::FEWEST)).map(|_| self.cycle());
-        let cycles = cycles.collect::<Result<Vec<Cycle>, _>>()?;
+        let mut begins = Vec::new();
+        while begins.len() < periods.max(ResonanceFit::FEWEST) {
+            begins.push(self.run.period(self.stage)?);
+        }
+        let raw = &self.run.samples[begins[0].0..];
+        let omega = mean(raw.iter().map(|sample| sample.command.drive.omega));
+        let cleaned = without_tones(raw, self.knowledge, omega);
+        let samples = cleaned.as_deref().unwrap_or(raw);
+        let ends = begins[1..].iter().map(|next| next.0).chain([self.run.samples.len()]);
+        let cycles: Vec<Cycle> = begins
+            .iter()
+            .zip(ends)
+            .filter_map(|(&(begin, turns), end)| {
+                let period = &samples[begin - begins[0].0..end - begins[0].0];
+                Cycle::of(period, self.run.sample_time, turns * TAU, self.knowledge.target)
+            })
+            .collect();
         let Some(fit) = ResonanceFit::of(&cycles, self.knowledge, None) else {
             return self.measure(periods);
         };
-        let count = cycles.iter().map(|cycle| cycle.samples).sum::<usize>();
-        let samples = &self.run.samples[self.run.samples.len() - count..];
         let [drive, omega] = fit.at(0.0);
         let leg = Leg {
             response: fit.response.value,
             last: cycles[cycles.len() - 1].amplitude(),
             drive: drive.value,
             omega: omega.value,
-            regime: regime_on_the_way(samples, self.knowledge, drive, omega),
+            regime: regime_on_the_way(samples, self.knowledge, [fit.response, drive, omega]),
         };
         self.note(&leg);
         Ok(leg)

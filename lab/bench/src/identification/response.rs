@@ -178,7 +178,7 @@ pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64
 }
 
 /// These samples without the foreign tones in their response; `None` if there are none.
-fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
+pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
     let tones = Content::of(samples, knowledge, omega, 0, knowledge.target.measurands[0])?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
@@ -258,25 +258,26 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
     match Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) {
         None => Regime::Unknown,
         Some(content) if content.is_irregular() => Regime::Other,
-        Some(content) => regime_of(&content, samples, knowledge, base, omega),
+        Some(content) => {
+            let coloured = knowledge.target.colour(omega.value, knowledge.sample_time);
+            let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
+            let amplitude = content.amplitude * knowledge.target.displacement(0, omega.value).norm();
+            let response = Estimate::new(amplitude, &[noise * amplitude]);
+            regime_of(&content, samples, knowledge, [response, base, omega])
+        }
     }
 }
 
 /// [`regime_by_response`] of a motion that a loop moves: what its harmonics do not describe is the way, and not irregular.
-pub(crate) fn regime_on_the_way(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    let content = Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS);
-    content.map_or(Regime::Unknown, |content| {
-        regime_of(&content, samples, knowledge, base, omega)
-    })
+/// `at`: mean response, m, base, m, and frequency, rad/s.
+pub(crate) fn regime_on_the_way(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3]) -> Regime {
+    let content = Content::of(samples, knowledge, at[2].value, 0, ALL_HARMONICS);
+    content.map_or(Regime::Unknown, |content| regime_of(&content, samples, knowledge, at))
 }
 
-fn regime_of(content: &Content, samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
+fn regime_of(content: &Content, samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3]) -> Regime {
     let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
-    let target = knowledge.target;
-    let coloured = target.colour(omega.value, knowledge.sample_time);
-    let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
-    let amplitude = content.amplitude * target.displacement(0, omega.value).norm();
-    let response = Estimate::new(amplitude, &[noise * amplitude]);
+    let (target, omega) = (knowledge.target, at[2]);
     // The parameters of a simulation are known.
     let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
     // The force on the mass M over its inertia in the fundamental.
@@ -289,7 +290,7 @@ fn regime_of(content: &Content, samples: &[Sample], knowledge: &Knowledge, base:
     };
     let significant = SIGNIFICANT_HARMONIC * content.errors[1];
     let by_resonance = match is_known {
-        true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
+        true => impacts_by_resonance(&knowledge.linear, at, target.phase, epsilon),
         false => Impacts::Doubtful,
     };
     // Where the resonance does not tell, a third harmonic may.
