@@ -36,6 +36,8 @@ const MOVE_SHARE: f64 = 0.8;
 const SHORTEST_MOVE: f64 = 4.0;
 /// Duration of a rise of the response by the half-width, periods.
 const RISE: f64 = 60.0;
+/// Largest share by which the response rises in a leg: faster, the growth itself resembles another frequency and loss.
+const LARGEST_RISE: f64 = 0.25;
 /// Largest relative error of the half-width in the drawing.
 const DRAWING: f64 = 0.1;
 /// Largest and smallest response of the script over the half-width: a particle that moves freely has hit the walls, and the fold of r = 0.85 is larger.
@@ -44,9 +46,11 @@ const RESPONSES: [f64; 2] = [1.5, 0.05];
 const STEEPEST: f64 = 10.0;
 /// Smallest ratio of the setpoint to a response that follows it.
 const FOLLOWS: f64 = 0.8;
+/// Additional periods before the first level is measured, because the legs disturb the particle.
+const FIRST_PERIODS: usize = 24;
 /// Levels that bring the drive of a lock to the requested one within its uncertainty, before any within the limits of a lock is taken: each reduces the
 /// error to the share by which the slope is wrong.
-const PRECISE_LEVELS: usize = 3;
+const PRECISE_LEVELS: usize = 5;
 
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
 pub(crate) type Held = [f64; 3];
@@ -214,7 +218,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             cycles.drain(..cycles.len().saturating_sub(LONGEST_SETTLING));
             let criterion = self.criterion();
             let estimate = criterion.best(&cycles).filter(|one| is_judged && criterion.is_met(one));
-            let is_settled = estimate.is_some_and(|one| !self.is_another(&one) && self.is_in_phase(&one));
+            // At rest, the drive that holds the response is the one that is measured.
+            let is_settled = estimate.is_some_and(|one| {
+                let last = &cycles[cycles.len() - one.periods..];
+                let drive = mean(last.iter().map(|cycle| cycle.base.norm()));
+                self.is_near(&one, drive) && self.is_in_phase(&one)
+            });
             confirmed = if is_settled { confirmed + 1 } else { 0 };
         }
         Ok(())
@@ -244,6 +253,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             });
             near = if closed && is_near { near + 1 } else { 0 };
         }
+        // The start of the loop disturbs the particle, too.
+        self.leg(0.0, FOLLOWED, 0.0)?;
         self.leg(0.0, FOLLOWED, 0.0)
     }
 
@@ -270,7 +281,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             if leg.response > RESPONSES[0] * self.b || spare < DRAWING * leg.drive {
                 break;
             }
-            let change = (self.b / RISE).min(0.5 * MOVE_SHARE * PI * spare) * FOLLOWED as f64;
+            let fastest = (self.b / RISE).min(0.5 * MOVE_SHARE * PI * spare) * FOLLOWED as f64;
+            let change = fastest.min(LARGEST_RISE * leg.last);
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, change / FOLLOWED as f64)?;
         }
         self.fall(leg, -step)
@@ -304,30 +316,43 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// target. Returns false if the motion is lost.
     fn secant(&mut self, [before, leg]: [Leg; 2], step: f64) -> Result<bool, ExperimentError> {
         let mut slope = (leg.drive - before.drive) / (leg.response - before.response);
-        let mut at = [leg.response, leg.drive];
+        let (mut at, mut is_doubtful) = ([leg.response, leg.drive], false);
+        // The last level whose drive is within the limits of a lock.
+        let mut good = (!is_another(leg.drive - self.requested, 0.0, self.requested)).then_some(leg.response);
         for count in 0.. {
-            let change = (self.requested - at[1]) / slope;
             let largest = step * at[0];
+            let to = at[0] + ((self.requested - at[1]) / slope).clamp(-largest, largest);
+            // A change may disturb the motion for a while.
+            let to = if is_doubtful { good.unwrap_or(to) } else { to };
             let criterion = self.criterion();
-            let Level { estimate, cycles } = self.hold(at[0] + change.clamp(-largest, largest), &criterion)?;
-            if !self.is_symmetric(self.regime(&estimate, &cycles)) {
-                return Ok(false);
-            }
+            let Level { estimate, cycles } = self.hold(to, &criterion)?;
+            let is_symmetric = self.is_symmetric(self.regime(&estimate, &cycles));
             // What drifts only has a larger uncertainty.
             let is_irregular = |why: &Unsteady| matches!(why, Unsteady::Scatter(_)) && !criterion.is_met(&estimate);
-            if let Some(why) = estimate.unsteady.filter(is_irregular) {
-                let response = self.knowledge.target.units.response.quantity(estimate.response.value);
-                return Err(ExperimentError::NotSteady { periods: cycles.len(), response, why });
+            let irregular = estimate.unsteady.filter(is_irregular);
+            match irregular {
+                _ if is_symmetric && irregular.is_none() => {}
+                _ if !is_doubtful => {
+                    is_doubtful = true;
+                    continue;
+                }
+                Some(why) if is_symmetric => {
+                    let response = self.knowledge.target.units.response.quantity(estimate.response.value);
+                    return Err(ExperimentError::NotSteady { periods: cycles.len(), response, why });
+                }
+                _ => return Ok(false),
             }
             let next = [estimate.response.value, estimate.at[0].value];
-            let noise = SIGNIFICANT * estimate.at[0].uncertainty;
-            let is_near = (next[1] - self.requested).abs() < noise.max(POINT_RESOLUTION * self.requested);
-            let is_near = is_near || count >= PRECISE_LEVELS && !self.is_another(&estimate);
-            if is_near && self.is_in_phase(&estimate) {
+            let is_within = !is_another(next[1] - self.requested, estimate.at[0].uncertainty, self.requested);
+            let is_close =
+                self.is_near(&estimate, self.requested) || is_within && (is_doubtful || count >= PRECISE_LEVELS);
+            if is_close && self.is_in_phase(&estimate) {
                 return Ok(true);
             }
+            good = is_within.then_some(next[0]).or(good);
+            is_doubtful = false;
             // Between near levels, noise can be larger than what changes.
-            if (next[1] - at[1]).abs() > noise {
+            if (next[1] - at[1]).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
                 slope = (next[1] - at[1]) / (next[0] - at[0]);
             }
             at = next;
@@ -335,10 +360,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         Ok(false)
     }
 
-    /// Whether the drive that holds the response is another one than the requested one.
-    fn is_another(&self, estimate: &LevelEstimate) -> bool {
+    /// Whether the drive that holds the response is `drive`, m, as far as its uncertainty and the resolution of a point show.
+    fn is_near(&self, estimate: &LevelEstimate, drive: f64) -> bool {
         let Estimate { value, uncertainty } = estimate.at[0];
-        is_another(value - self.requested, uncertainty, self.requested)
+        (value - drive).abs() < (SIGNIFICANT * uncertainty).max(POINT_RESOLUTION * drive)
     }
 
     /// Whether the phase is as near to its target as a lock must be.
@@ -373,7 +398,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let (to, periods) = self.step(level);
         self.setpoint = level;
         self.run.hold_response(to)?;
-        let late = self.followed(level) as f64;
+        let late = (self.followed(level) + FIRST_PERIODS * usize::from(self.levels.is_empty())) as f64;
         while self.run.periods - start < periods + late {
             self.cycle()?;
         }
@@ -537,7 +562,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             last: cycles[cycles.len() - 1].amplitude(),
             drive: drive.value,
             omega: omega.value,
-            regime: regime_on_the_way(samples, self.knowledge, [fit.response, drive, omega]),
+            // Harmonics above the third count as noise of a period, but do not scatter.
+            regime: regime_on_the_way(
+                samples,
+                self.knowledge,
+                [fit.response, drive, omega]
+                    .map(|one| Estimate::new(one.value, &[fit.excess.min(1.0) * one.uncertainty])),
+            ),
         };
         self.note(&leg);
         Ok(leg)

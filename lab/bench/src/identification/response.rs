@@ -271,7 +271,7 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
 /// [`regime_by_response`] of a motion that a loop moves: what its harmonics do not describe is the way, and not irregular.
 /// `at`: mean response, m, base, m, and frequency, rad/s.
 pub(crate) fn regime_on_the_way(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3]) -> Regime {
-    let content = Content::of(samples, knowledge, at[2].value, 0, ALL_HARMONICS);
+    let content = Content::of(samples, knowledge, at[2].value, 0, knowledge.target.measurands[0]);
     content.map_or(Regime::Unknown, |content| regime_of(&content, samples, knowledge, at))
 }
 
