@@ -263,23 +263,31 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
             let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
             let amplitude = content.amplitude * knowledge.target.displacement(0, omega.value).norm();
             let response = Estimate::new(amplitude, &[noise * amplitude]);
-            regime_of(&content, samples, knowledge, [response, base, omega])
+            // The parameters of a simulation are known.
+            let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
+            regime_of(&content, samples, knowledge, [response, base, omega], is_known)
         }
     }
 }
 
 /// [`regime_by_response`] of a motion that a loop moves: what its harmonics do not describe is the way, and not irregular.
-/// `at`: mean response, m, base, m, and frequency, rad/s.
+/// It serves the choice of the next move, for which the linear response counts as known. `at`: mean response, m, base, m, and frequency, rad/s.
 pub(crate) fn regime_on_the_way(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3]) -> Regime {
-    let content = Content::of(samples, knowledge, at[2].value, 0, knowledge.target.measurands[0]);
-    content.map_or(Regime::Unknown, |content| regime_of(&content, samples, knowledge, at))
+    let content = Content::of(samples, knowledge, at[2].value, 0, ALL_HARMONICS);
+    content.map_or(Regime::Unknown, |content| {
+        regime_of(&content, samples, knowledge, at, true)
+    })
 }
 
-fn regime_of(content: &Content, samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3]) -> Regime {
+fn regime_of(
+    content: &Content,
+    samples: &[Sample],
+    knowledge: &Knowledge,
+    at: [Estimate; 3],
+    is_known: bool,
+) -> Regime {
     let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
     let (target, omega) = (knowledge.target, at[2]);
-    // The parameters of a simulation are known.
-    let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
     // The force on the mass M over its inertia in the fundamental.
     let square = (3.0 * omega.value / omega0).powi(2);
     let force = |harmonic: f64| 9.0 * (square - 1.0) * harmonic / over_v(definition, square);
