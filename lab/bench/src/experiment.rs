@@ -2,8 +2,7 @@
 //!
 //! It follows the state of the controller: a controller that switches the drive off ends the experiment at once.
 
-mod judge;
-mod search;
+mod script;
 
 use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
@@ -20,9 +19,7 @@ use vines_scene::knowledge::Target;
 use vines_scene::plan::{DECAYED, Plan};
 use vines_scene::scene::{Unit, key};
 
-pub use judge::Condition;
-use judge::Judge;
-pub(crate) use search::Search;
+pub(crate) use script::{Level, Script, is_reached};
 
 /// The stage an experiment is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,13 +97,10 @@ fn limit_in_words(limit: f64, target: &Target) -> String {
     }
 }
 
-/// What a lock waits for that the bench judges, in words.
-fn unmet_in_words(unmet: Option<Condition>) -> String {
-    unmet.map_or_else(String::new, |Condition { name, key, found, allowed }| {
-        format!(
-            "; the bench judges the lock, as the controller does not: the {name} is {found:.1e}, and phase_lock.lock.{key} with the noise of the \
-             readings allows {allowed:.1e}"
-        )
+/// What a lock waits for that the bench measures, in words.
+fn unmet_in_words(unmet: Option<&str>) -> String {
+    unmet.map_or_else(String::new, |unmet| {
+        format!("; the bench measures the lock, as the controller does not: {unmet}")
     })
 }
 
@@ -123,10 +117,8 @@ pub struct SearchFound {
     pub strongest: f64,
     /// Requested G.
     pub requested: f64,
-    /// How often the motion was lost, or not found.
-    pub lost: u32,
-    /// Whether the time ended while a motion was to settle, and if so, whether under the constant drive.
-    pub unsettled: Option<bool>,
+    /// Whether the time ended first.
+    pub late: bool,
     /// Half-width of the drawing as a displacement at the sensor, m, if the rig does not report impacts: nothing is then said of a particle.
     pub silent: Option<f64>,
 }
@@ -142,18 +134,15 @@ impl SearchFound {
     fn without_impacts(&self, b: f64) -> String {
         let [low, high] = self.tried.map(|c| short(c * b));
         let tried = format!("at responses from {low} to {high} m ");
-        match (self.held, self.impacts, self.unsettled) {
-            (None, false, _) => {
+        match (self.held, self.impacts) {
+            (None, false) => {
                 tried
                     + "the motion stayed near the linear response. Allow a larger drive (phase_lock.amplitude_max), or track it with `vines backbone`"
             }
-            (None, true, _) => {
+            (None, true) => {
                 tried + "no motion was steady and nonlinear. Try another drive, or track it with `vines backbone`"
             }
-            (Some(_), _, Some(_)) => {
-                tried + "the motion did not settle. Allow more time (phase_lock.acquire_timeout), or try another drive"
-            }
-            (Some((_, [_, c, _])), _, None) => format!(
+            (Some((_, [_, c, _])), _) => format!(
                 "{tried}the drive was nearest to the requested one at a response of {} m. Allow more time (phase_lock.acquire_timeout), or try \
                  another drive",
                 short(c * b)
@@ -170,8 +159,10 @@ impl Display for SearchFound {
         let [low, high] = self.tried;
         let Some(([least, largest], [g, c, sigma])) = self.held else {
             write!(f, "at responses from C = {low:.3} to {high:.3} ")?;
-            return match (self.impacts, self.lost) {
-                (_, 0) => f.write_str("no motion was symmetric 1:1 yet. Allow more time (phase_lock.acquire_timeout)"),
+            return match (self.impacts, self.late) {
+                (_, true) => {
+                    f.write_str("no motion was symmetric 1:1 yet. Allow more time (phase_lock.acquire_timeout)")
+                }
                 (true, _) => f.write_str("impacts began, but no motion was symmetric 1:1. Try another G"),
                 (false, _) => write!(
                     f,
@@ -183,17 +174,12 @@ impl Display for SearchFound {
         };
         write!(
             f,
-            "with the response under control, the motion was symmetric 1:1 at drives from G = {least:.4} to {largest:.4}, nearest at G = {g:.4}, \
-             C = {c:.4}, sigma = {sigma:.4}; "
+            "with the response under control, the motion was symmetric 1:1 at drives from G = {:.4} to {largest:.4}, nearest at G = {g:.4}, \
+             C = {c:.4}, sigma = {sigma:.4}; ",
+            least.max(0.0)
         )?;
-        f.write_str(match (self.unsettled, self.lost) {
-            (Some(true), _) => {
-                "there it did not settle under the constant drive. Allow more time (phase_lock.acquire_timeout), or try another G"
-            }
-            (Some(false), _) => {
-                "there it did not settle, although its response was under control. Allow more time (phase_lock.acquire_timeout), or try another G"
-            }
-            (None, 0) => "the time ended on the way. Allow more (phase_lock.acquire_timeout)",
+        f.write_str(match self.late {
+            true => "the time ended on the way. Allow more (phase_lock.acquire_timeout)",
             _ if (least..=largest).contains(&self.requested) => "nearer it was lost. Try another G",
             _ => "beyond it was lost. Ask for a G well within this range",
         })
@@ -252,7 +238,7 @@ pub enum ExperimentError {
     Controller(#[from] ControllerError),
     #[error(
         "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s{}",
-        phase_in_words(*phase_error), unmet_in_words(*unmet)
+        phase_in_words(*phase_error), unmet_in_words(unmet.as_deref())
     )]
     NoLock {
         periods: f64,
@@ -260,7 +246,7 @@ pub enum ExperimentError {
         phase_error: Option<f64>,
         omega: f64,
         /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
-        unmet: Option<Condition>,
+        unmet: Option<String>,
     },
     #[error("no lock within {periods:.0} periods at the requested drive{}: {found}", found.requested_in_words())]
     NotReached { periods: f64, found: Box<SearchFound> },
@@ -276,18 +262,6 @@ pub enum ExperimentError {
         stage: Stage,
         fault: Fault,
         evidence: Box<Evidence>,
-    },
-    #[error(
-        "the 1:1 motion, held at {held:.4e} (C = {:.4}), is {regime} at {level:.4e} (C = {:.4}): the backbone ends between the two, or the \
-         step was too large",
-        c[0], c[1]
-    )]
-    MotionLost {
-        held: Quantity,
-        level: Quantity,
-        /// Both over the half-width.
-        c: [f64; 2],
-        regime: crate::identification::Regime,
     },
     #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
     OtherThanAsked { departure: Departure, error: Box<Self> },
@@ -315,10 +289,6 @@ pub enum ExperimentError {
         drive: Drive,
         requested: Quantity,
     },
-    #[error(
-        "the motion, steady at a response of {held:.4e}, is irregular at {level:.4e}: it ends between the two, or the step was too large"
-    )]
-    SteadyLost { held: Quantity, level: Quantity },
     #[error("the scene has no drive, so that nothing can lock")]
     NoDrive,
     #[error("the controller answered {name} = {value}; it must be {allowed}. The drive is off")]
@@ -391,15 +361,7 @@ fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut ControlLoop<'_, R, C>,
 ) -> Result<Record, ExperimentError> {
     let plan = bench.plan;
-    let held = if plan.knowledge.is_at_phase_resonance() {
-        Search::new(bench).lock()?
-    } else {
-        None
-    };
-    // A controller that cannot control the response waits for the lock under the constant drive.
-    while held.is_none() && !bench.settled {
-        bench.sample(Stage::Locking)?;
-    }
+    let held = Script::new(bench).lock()?;
     let settled = bench.taken - 1;
     for _ in 0..plan.hold {
         bench.sample(Stage::Holding)?;
@@ -416,7 +378,7 @@ fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
         sample_time: plan.knowledge.sample_time,
         samples: Vec::new(),
         settled,
-        held: held == Some(true),
+        held,
         hold_end,
         released,
         clipped_percent,
@@ -448,9 +410,6 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     pub periods: f64,
     /// Latest output of the controller.
     pub last: Command,
-    /// Whether the lock has settled, as the controller says, or else the bench.
-    pub settled: bool,
-    judge: Judge,
     /// Time limit for the lock, samples.
     limit: usize,
     /// Receives the stage and the samples taken in it.
@@ -510,8 +469,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             taken: 0,
             periods: 0.0,
             last: Command::default(),
-            settled: false,
-            judge: Judge::new(config, plan.knowledge.target),
             limit: Stage::Locking.samples(plan),
             progress,
             stage: (Stage::Locking, 0),
@@ -557,12 +514,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             self.ramp_down(command)?;
             return Err(self.tripped(stage, &command));
         }
-        self.settled = match command.settled {
-            settled if stage == Stage::Locking && self.judges(&command) => {
-                self.judge.sample(self.samples, self.periods) || settled == Some(true)
-            }
-            settled => settled == Some(true),
-        };
         (self.progress)(stage, self.taken - self.stage.1);
         if stage == Stage::Locking && self.taken >= self.limit {
             return Err(self.no_lock(&command));
@@ -689,13 +640,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             periods: self.periods,
             phase_error: command.phase_error.map(f64::to_degrees),
             omega: command.drive.omega,
-            unmet: self.judge.unmet().filter(|_| self.judges(command)),
+            unmet: None,
         }
-    }
-
-    /// Whether the bench judges the lock: of a controller that does not, and behind a filter, as controllers take noise for white.
-    fn judges(&self, command: &Command) -> bool {
-        command.settled.is_none() || self.plan.knowledge.target.filter.is_some()
     }
 }
 

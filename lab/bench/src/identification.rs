@@ -19,7 +19,7 @@ use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
 use vines_scene::scene::{Measurand, Units};
 
-pub(crate) use asked::Departure;
+pub(crate) use asked::{Departure, is_another};
 pub(crate) use cycle::Cycle;
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
 pub(crate) use decay::{Harmonic, PER_PERIOD, base_at_rest, harmonic};
@@ -28,7 +28,7 @@ pub(crate) use level::{LONGEST_SETTLING, is_off_target};
 pub(crate) use resonance_fit::ResonanceFit;
 pub use response::Tone;
 pub(crate) use response::{
-    ASYMMETRIC, Line, classify, degrees, drive_harmonics, foreign_tone, regime_by_response, subharmonic, without_tones,
+    Line, classify, drive_harmonics, foreign_tone, regime_by_response, regime_on_the_way, subharmonic, without_tones,
 };
 pub use vines_model::regime::{Impact, Regime};
 
@@ -306,7 +306,7 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
         at,
         requested_e_m,
         requested_f_n,
-        at_requested_drive: !asked::is_another(at.drive().value - requested, at.drive().uncertainty, requested),
+        at_requested_drive: !is_another(at.drive().value - requested, at.drive().uncertainty, requested),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
         averaged: approach.len(),

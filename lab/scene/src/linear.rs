@@ -91,6 +91,9 @@ impl MeasuredLinear {
 
 /// Largest mass ratio of a rig over the ratio in its drawing, whose masses are known within a fifth.
 const LARGEST_RATIO: f64 = 1.0 / (1.0 - 0.2);
+/// Smallest distance of a stable symmetric 1:1 motion from the disc of motions without impacts: of `|χ| > 1` and `|χ - 1| > 1` to `|χ - 1/2| <= 1/2`, it is
+/// `(sqrt(3) - 1)/2`.
+const LEAST_DISTANCE: f64 = 0.366;
 /// Largest third harmonic of the force of sliding friction over the force that carries the particle: of a square wave, whose height is at most
 /// that force.
 const FRICTION_THIRD: f64 = 4.0 / (3.0 * PI);
@@ -106,12 +109,14 @@ pub enum Impacts {
     Doubtful,
 }
 
-/// What a distance from the centre of a region without impacts, whose radius is `radius`, says.
-fn beyond(distance: f64, uncertainty: f64, radius: f64) -> Impacts {
-    match distance - radius {
-        beyond if beyond > SIGNIFICANT * uncertainty => Impacts::Needed,
-        beyond if beyond <= 0.0 => Impacts::NotNeeded,
-        _ => Impacts::Doubtful,
+/// What a distance from the centre of a region without impacts says: beyond `outer` they are needed, within `inner` they are not.
+fn beyond(distance: f64, uncertainty: f64, [inner, outer]: [f64; 2]) -> Impacts {
+    if distance > outer + SIGNIFICANT * uncertainty {
+        Impacts::Needed
+    } else if distance <= inner {
+        Impacts::NotNeeded
+    } else {
+        Impacts::Doubtful
     }
 }
 
@@ -139,19 +144,28 @@ pub fn impacts_by_resonance(
         linear.uncertainty,
     ];
     let uncertainty = Estimate::new(0.0, &parts).uncertainty * 2.0 / linear.omega0;
-    // The disc of every particle up to the largest one, added to the state in which the linear response was measured.
-    let [centre, radius] = match linear.particle {
-        ParticleState::Free => [0.5, LARGEST_RATIO - 0.5],
-        ParticleState::Carried => [-0.5, LARGEST_RATIO - 0.5],
-        ParticleState::Unknown => [0.0, LARGEST_RATIO],
+    // The disc of every particle up to the largest one, added to the state in which the linear response was measured. Of an unknown state, motions without
+    // impacts are as far away as the diameter of the disc, and those with impacts as near as `LEAST_DISTANCE`.
+    let (centre, radii) = match linear.particle {
+        ParticleState::Free => (0.5, [LARGEST_RATIO - 0.5; 2]),
+        ParticleState::Carried => (-0.5, [LARGEST_RATIO - 0.5; 2]),
+        ParticleState::Unknown => (0.0, [LEAST_DISTANCE / LARGEST_RATIO, LARGEST_RATIO]),
     };
-    beyond((added - centre * epsilon).norm(), uncertainty, radius * epsilon)
+    beyond(
+        (added - centre * epsilon).norm(),
+        uncertainty,
+        radii.map(|radius| radius * epsilon),
+    )
 }
 
 /// What the third harmonic of the structure's motion says of impacts: the force that excites it, over the force of the mass M in the fundamental.
 #[must_use]
 pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
-    beyond(third.value, third.uncertainty, FRICTION_THIRD * LARGEST_RATIO * epsilon)
+    beyond(
+        third.value,
+        third.uncertainty,
+        [FRICTION_THIRD * LARGEST_RATIO * epsilon; 2],
+    )
 }
 
 /// Resolution of a stated point: of response and drive, relative, and of the frequency over the half-power bandwidth. No sensor and no drawing shows

@@ -13,7 +13,7 @@ use vines_scene::scene::Dimensionless;
 const SAME_DRIVE: f64 = 0.01;
 
 /// Whether a drive that differs by `difference` with the standard uncertainty `u` is another one than `requested`; all in m.
-pub(super) fn is_another(difference: f64, u: f64, requested: f64) -> bool {
+pub(crate) fn is_another(difference: f64, u: f64, requested: f64) -> bool {
     difference.abs() > (SAME_DRIVE * requested).max(SIGNIFICANT * u)
 }
 

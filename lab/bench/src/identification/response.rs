@@ -30,7 +30,7 @@ const LINES: usize = 8;
 const SIGNIFICANT_HARMONIC: f64 = 4.0;
 /// Smallest even harmonic of an asymmetric motion, over the larger odd one next to it: of the second over the third, symmetric motions have about
 /// 0.01, irregular ones 2 and more.
-pub(crate) const ASYMMETRIC: f64 = 0.5;
+const ASYMMETRIC: f64 = 0.5;
 /// Harmonics that are fitted to a displacement.
 const RESPONSE_HARMONICS: usize = 5;
 
@@ -38,7 +38,7 @@ const RESPONSE_HARMONICS: usize = 5;
 const ALL_HARMONICS: Measurand = Measurand::Acceleration;
 
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
-pub(crate) fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
+fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
     let count = harmonics_of(measurand, samples_per_period, RESPONSE_HARMONICS);
     [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
 }
@@ -255,20 +255,39 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
 pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    let Some(content) = Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) else {
-        return Regime::Unknown;
-    };
-    if content.is_irregular() {
-        return Regime::Other;
+    match Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) {
+        None => Regime::Unknown,
+        Some(content) if content.is_irregular() => Regime::Other,
+        Some(content) => {
+            let coloured = knowledge.target.colour(omega.value, knowledge.sample_time);
+            let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
+            let amplitude = content.amplitude * knowledge.target.displacement(0, omega.value).norm();
+            let response = Estimate::new(amplitude, &[noise * amplitude]);
+            // The parameters of a simulation are known.
+            let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
+            regime_of(&content, samples, knowledge, [response, base, omega], is_known)
+        }
     }
+}
+
+/// [`regime_by_response`] of a motion that a loop moves: what its harmonics do not describe is the way, and not irregular.
+/// It serves the choice of the next move, for which the linear response counts as known. `at`: mean response, m, base, m, and frequency, rad/s.
+pub(crate) fn regime_on_the_way(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3]) -> Regime {
+    let content = Content::of(samples, knowledge, at[2].value, 0, ALL_HARMONICS);
+    content.map_or(Regime::Unknown, |content| {
+        regime_of(&content, samples, knowledge, at, true)
+    })
+}
+
+fn regime_of(
+    content: &Content,
+    samples: &[Sample],
+    knowledge: &Knowledge,
+    at: [Estimate; 3],
+    is_known: bool,
+) -> Regime {
     let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
-    let target = knowledge.target;
-    let coloured = target.colour(omega.value, knowledge.sample_time);
-    let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
-    let amplitude = content.amplitude * target.displacement(0, omega.value).norm();
-    let response = Estimate::new(amplitude, &[noise * amplitude]);
-    // The parameters of a simulation are known.
-    let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
+    let (target, omega) = (knowledge.target, at[2]);
     // The force on the mass M over its inertia in the fundamental.
     let square = (3.0 * omega.value / omega0).powi(2);
     let force = |harmonic: f64| 9.0 * (square - 1.0) * harmonic / over_v(definition, square);
@@ -278,14 +297,20 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
         uncertainty: force(content.errors[1]),
     };
     let significant = SIGNIFICANT_HARMONIC * content.errors[1];
-    let impacts = match is_known {
-        true => impacts_by_resonance(&knowledge.linear, [response, base, omega], target.phase, epsilon),
-        false if third_harmonic > significant => impacts_by_harmonic(third, epsilon),
+    let by_resonance = match is_known {
+        true => impacts_by_resonance(&knowledge.linear, at, target.phase, epsilon),
         false => Impacts::Doubtful,
     };
+    // Where the resonance does not tell, a third harmonic may.
+    let impacts = match by_resonance {
+        Impacts::Doubtful if third_harmonic > significant && impacts_by_harmonic(third, epsilon) == Impacts::Needed => {
+            Impacts::Needed
+        }
+        by_resonance => by_resonance,
+    };
     match impacts {
-        Impacts::NotNeeded if is_known => Regime::NoImpacts,
-        Impacts::NotNeeded | Impacts::Doubtful => Regime::NotEstablished,
+        Impacts::NotNeeded => Regime::NoImpacts,
+        Impacts::Doubtful => Regime::NotEstablished,
         Impacts::Needed if content.is_asymmetric(target.measurands[0].order()) => Regime::Asymmetric,
         Impacts::Needed if is_asymmetric_by_reference(samples, knowledge, omega.value) => Regime::Asymmetric,
         Impacts::Needed if third_harmonic > significant => Regime::Symmetric,

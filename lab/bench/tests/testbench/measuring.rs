@@ -188,27 +188,37 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
     );
     // From the middle, impacts would begin at G = 4.5; a particle that moves needs less.
     let moving = at("plant.lambda=4.5 start.dq2=0.8 excitation.G=2 chain.adc_bits=12").unwrap();
-    assert!((moving.c - 0.336333).abs() < 1e-4, "{moving:?}");
+    let exact = ExactCurve::of(&dimensionless("plant.lambda=4.5").dimensionless());
+    let distance = exact.distance(moving.c, moving.sigma, moving.g).unwrap();
+    assert!(
+        (moving.g - 2.0).abs() < 0.02 && distance.nearest < 1e-4,
+        "{distance:?}: {moving:?}"
+    );
     // A delay that nobody compensates is seen, and one common to both sensors is not.
     let late = at("chain.delay=1 chain.reference=false phase_lock.delay=0").unwrap();
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
-    let common = at("chain.delay=1").unwrap();
-    // Both locks are points of one backbone, whose slope a third one gives.
-    let other = at("excitation.G=1.101").unwrap();
-    let slope = (other.sigma - ideal.sigma) / (other.c - ideal.c);
-    assert!((common.sigma - ideal.sigma - slope * (common.c - ideal.c)).abs() < 1e-6);
+    let exact = ExactCurve::of(&dimensionless("").dimensionless());
+    let both = at("chain.delay=1").unwrap();
+    assert!(
+        exact.distance(both.c, both.sigma, both.g).unwrap().nearest < 1e-5,
+        "{both:?}"
+    );
 }
 
 #[test]
 fn a_delay_of_more_than_a_period_that_the_controller_knows_does_not_keep_it_from_the_lock() {
-    let ideal = at("").unwrap();
+    let exact = ExactCurve::of(&dimensionless("").dimensionless());
     for settings in [
         "chain.delay=120",
         "chain.delay=120 chain.reference=false",
         "chain.delay=250 controller.bandwidth=0.06",
     ] {
         let late = at(settings).unwrap();
-        assert!((late.sigma - ideal.sigma).abs() < 1e-4, "{settings}: {late:?}");
+        let distance = exact.distance(late.c, late.sigma, late.g).unwrap();
+        assert!(
+            distance.sigma.unwrap().abs() < 3.0 * late.u_sigma,
+            "{settings}: {late:?}"
+        );
     }
 }
 
@@ -217,6 +227,12 @@ fn the_gains_of_an_anti_alias_filter_and_of_a_held_base_are_corrected() {
     // Long enough for the response to come to rest.
     let at = |settings: &str| at(&format!("{settings} record.hold_periods=1800")).unwrap();
     let ideal = at("");
+    // From the exact orbit at the measured drive.
+    let off = |lock: &ResonancePoint| {
+        let orbits = phase_resonant(&Dimensionless { g: lock.g, ..dimensionless("").dimensionless() });
+        let orbit = orbits.into_iter().find(|orbit| orbit.stable).unwrap();
+        [lock.c - orbit.c, lock.sigma - orbit.sigma]
+    };
     // The gain at the lock is 0.9992 and 0.97.
     for settings in [
         "chain.filter=5",
@@ -224,13 +240,13 @@ fn the_gains_of_an_anti_alias_filter_and_of_a_held_base_are_corrected() {
         "chain.filter=5 chain.reference=false",
     ] {
         let filtered = at(settings);
-        let [c, sigma] = [filtered.c - ideal.c, filtered.sigma - ideal.sigma];
+        let [c, sigma] = [0, 1].map(|n| off(&filtered)[n] - off(&ideal)[n]);
         assert!(c.abs() < 3e-6 && sigma.abs() < 1e-4, "{settings}: {c:e}, {sigma:e}");
     }
     // The fundamental of a base that is held for a hundredth of a period is 1.6e-4 smaller than that of its samples.
     let held = at("chain.hold=true chain.reference=false");
-    let half = 0.5 * (TAU * held.f_hz) * (TAU / 100.0);
-    assert!((held.g - 1.1 * half.sin() / half).abs() < 1e-6, "{held:?}");
+    let c = off(&held)[0] - off(&ideal)[0];
+    assert!(c.abs() < 3e-6, "{c:e}: {held:?}");
 }
 
 #[test]
@@ -507,7 +523,7 @@ fn random_rigs_lock_from_rest_within_2e_3_of_a_stable_orbit() {
     for _ in 0..24 {
         let scene = rig_with_stable_orbit(&mut uniform, &[""; 0]).unwrap();
         let lock = lock(&scene);
-        let mut orbits = phase_resonant(&scene.dimensionless());
+        let mut orbits = phase_resonant(&Dimensionless { g: lock.at.g, ..scene.dimensionless() });
         // A held response needs no stability under a constant drive.
         orbits.retain(|orbit| orbit.stable || lock.held);
         let is_near = |c: f64, sigma: f64| (c - lock.at.c).abs().max((sigma - lock.at.sigma).abs()) <= 2e-3;
@@ -555,9 +571,9 @@ fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
         };
         assert_eq!(lock.regime, expected);
         assert_eq!(lock.friction.is_some(), name == "rough");
-        // The stable exact orbit of an ideal cavity at the scene's drive.
+        // The stable exact orbit of an ideal cavity at the measured drive.
         let is_exact = |r: f64| {
-            let orbits = phase_resonant(&Dimensionless { r, ..scene.dimensionless() });
+            let orbits = phase_resonant(&Dimensionless { r, g: lock.at.g, ..scene.dimensionless() });
             let orbit = orbits.iter().find(|orbit| orbit.stable).unwrap();
             let [sigma, c] = [lock.at.sigma - orbit.sigma, lock.at.c - orbit.c];
             assert!(sigma.abs() < 1e-4 && c.abs() < 1e-4, "{sigma:.1e} {c:.1e}");
@@ -631,7 +647,10 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
         let [clean, humming] = [&[][..], &in_metres].map(|tones| points(&mut rig(&scene, tones), &scene));
         for (clean, point) in clean.iter().zip(humming) {
             let is_known = |one: &LevelPoint| matches!(one.regime, Regime::Symmetric | Regime::Unresolved);
-            assert!(point.settled && is_known(&point) && is_known(clean));
+            assert!(
+                point.settled && is_known(&point) && is_known(clean),
+                "{clean:?}, {point:?}"
+            );
             let tone = point.tone.unwrap();
             assert!((tone.hertz - hertz).abs() < 0.01);
             assert!((tone.share / (share * 0.55 / point.at.c) - 1.0).abs() < 0.02);
@@ -646,31 +665,47 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
             text.starts_with(&format!("a foreign tone of {hertz:.1} Hz, ")),
             "{text}"
         );
-        assert!(is_near(&humming.at, &clean.at) && clean.tone.is_none());
+        // Both are on one curve, whatever their drives are.
+        let exact = ExactCurve::of(&scene.dimensionless());
+        let [of_hum, of_clean] =
+            [humming.at, clean.at].map(|at| exact.distance(at.c, at.sigma, at.g).unwrap().sigma.unwrap());
+        let u = humming.at.u_sigma.hypot(clean.at.u_sigma);
+        assert!((of_hum - of_clean).abs() < 3.0 * u && clean.tone.is_none());
     }
 }
 
 #[test]
-fn beside_symmetry_breaking_a_lock_waits_until_the_even_harmonics_have_stopped_growing() {
+fn beside_symmetry_breaking_a_lock_is_asymmetric_or_says_that_its_growth_would_not_have_shown() {
     // Orbits are stable up to G = 1.414. Here the symmetry is lost so slowly that phase and frequency are steady before.
-    let found = identified(&paper(&["start.dq2=0", "excitation.G=1.424"]));
-    let is_named = matches!(
-        found,
-        Err(IdentificationError::Regime { regime: Regime::Asymmetric, .. })
-    );
-    assert!(is_named, "{found:?}");
+    let scene = paper(&["start.dq2=0", "excitation.G=1.424"]);
+    let found = identified(&scene);
+    match found {
+        Err(IdentificationError::Regime { regime: Regime::Asymmetric, .. }) => {}
+        Ok(found) => {
+            let at = Dimensionless { g: found.lock.at.g, ..scene.dimensionless() };
+            let growth = phase_resonant(&at)
+                .into_iter()
+                .map(|orbit| orbit.multipliers[3].powi(2) - 1.0);
+            assert!(
+                growth.fold(f64::INFINITY, f64::min) < found.lock.unseen_growth,
+                "{:?}",
+                found.lock
+            );
+        }
+        Err(error) => panic!("{error}"),
+    }
 }
 
 #[test]
 fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
     for (settings, parts) in [
         (
-            "start.dq2=0 phase_lock.acquire_timeout=830",
+            "start.dq2=0 phase_lock.acquire_timeout=500",
             ["no motion was symmetric 1:1 yet", "Allow more time"],
         ),
         (
             "start.dq2=0 phase_lock.acquire_timeout=1385",
-            ["symmetric 1:1 at drives from G = 1.29", "Allow more"],
+            ["symmetric 1:1 at drives from G = 1.", "Allow more"],
         ),
         (
             "start.dq2=0 excitation.G=0.5",
@@ -683,7 +718,6 @@ fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
 }
 
 #[test]
-#[ignore = "a leg of the search can need a drive below zero, until the one estimator replaces the search"]
 fn a_refusal_names_no_drive_below_zero() {
     let found = SearchFound {
         tried: [0.1, 0.5],
@@ -691,8 +725,7 @@ fn a_refusal_names_no_drive_below_zero() {
         held: Some(([-0.2017, 0.9], [0.9, 0.4, -1.0])),
         strongest: 4.4,
         requested: 1.1,
-        lost: 4,
-        unsettled: None,
+        late: false,
         silent: None,
     };
     assert!(!found.to_string().contains("G = -"), "{found}");
