@@ -48,7 +48,7 @@ rust_tool() {
     export PATH="$tools/bin:$PATH"
     ! grep -qs "^\"$1 $2 " "$tools/.crates.toml" || return 0
     stage "Installing $1 $2 (some minutes)"
-    cargo install "$1" --quiet --locked --version "$2" --root "$tools" --target-dir "$tools/build" "${@:3}"
+    cargo install "$1" --quiet --locked --force --version "$2" --root "$tools" --target-dir "$tools/build" "${@:3}"
     rm -rf "$tools/build"
 }
 
