@@ -287,8 +287,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// beside a carried particle, their evidence grows as the response falls.
     fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let mut seen = has_impacts(leg.regime);
-        while !self.is_symmetric(leg.regime)
-            && !(seen && leg.regime == Regime::NoImpacts)
+        while !(self.is_symmetric(leg.regime) || seen && leg.regime == Regime::NoImpacts)
             && self.setpoint > (RESPONSES[1] * self.b).max(FOLLOWS * leg.last)
         {
             leg = self.sweep(&leg, step)?;
