@@ -6,7 +6,7 @@
 //! distances, with two degrees of freedom, are below 1.96. A lock is correct within 2e-3 in all three, uncertain within four u, and wrong beyond;
 //! other runs are refused, with a reason. Under a constant drive it is also wrong where the orbit there is unstable and grows by more than the result
 //! says it would show; `unseen` counts locks where it grows by less. `other_drive` counts locks whose measured drive is another than the requested
-//! one, by more than 2e-3 of it and three u: a response that has not come to rest. The result tells them.
+//! one, by more than 1 % of it and three u: a response that has not come to rest. The result tells them.
 //!
 //! Arguments: RIGS, SEED, SNR in dB or `none`. Writes validation/locks.csv.
 
@@ -53,7 +53,7 @@ fn lock(scene: &Scene) -> Result<Found, Failure> {
         _ => 2,
     }] = 1;
     counts[4] = usize::from(is_unseen);
-    let is_other = (at.g - d.g).abs() > f64::max(2e-3 * d.g, 3.0 * at.u_g);
+    let is_other = (at.g - d.g).abs() > f64::max(0.01 * d.g, 3.0 * at.u_g);
     counts[5] = usize::from(is_other);
     if counts[0] == 0 || unstable || is_other {
         let (is, held) = (lock.regime, if lock.held { ", held" } else { "" });

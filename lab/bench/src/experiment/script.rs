@@ -36,8 +36,6 @@ const MOVE_SHARE: f64 = 0.8;
 const SHORTEST_MOVE: f64 = 4.0;
 /// Duration of a rise of the response by the half-width, periods.
 const RISE: f64 = 60.0;
-/// Largest share by which the response rises in a leg: faster, the growth itself resembles another frequency and loss.
-const LARGEST_RISE: f64 = 0.25;
 /// Largest relative error of the half-width in the drawing.
 const DRAWING: f64 = 0.1;
 /// Largest and smallest response of the script over the half-width: a particle that moves freely has hit the walls, and the fold of r = 0.85 is larger.
@@ -253,8 +251,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             });
             near = if closed && is_near { near + 1 } else { 0 };
         }
-        // The start of the loop disturbs the particle, too.
-        self.leg(0.0, FOLLOWED, 0.0)?;
         self.leg(0.0, FOLLOWED, 0.0)
     }
 
@@ -281,8 +277,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             if leg.response > RESPONSES[0] * self.b || spare < DRAWING * leg.drive {
                 break;
             }
-            let fastest = (self.b / RISE).min(0.5 * MOVE_SHARE * PI * spare) * FOLLOWED as f64;
-            let change = fastest.min(LARGEST_RISE * leg.last);
+            let change = (self.b / RISE).min(0.5 * MOVE_SHARE * PI * spare) * FOLLOWED as f64;
             leg = self.leg(leg.last + change - self.setpoint, FOLLOWED, change / FOLLOWED as f64)?;
         }
         self.fall(leg, -step)
@@ -292,8 +287,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// beside a carried particle, their evidence grows as the response falls.
     fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let mut seen = has_impacts(leg.regime);
-        while !self.is_symmetric(leg.regime)
-            && !(seen && leg.regime == Regime::NoImpacts)
+        while !(self.is_symmetric(leg.regime) || seen && leg.regime == Regime::NoImpacts)
             && self.setpoint > (RESPONSES[1] * self.b).max(FOLLOWS * leg.last)
         {
             leg = self.sweep(&leg, step)?;
@@ -316,41 +310,29 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// target. Returns false if the motion is lost.
     fn secant(&mut self, [before, leg]: [Leg; 2], step: f64) -> Result<bool, ExperimentError> {
         let mut slope = (leg.drive - before.drive) / (leg.response - before.response);
-        let (mut at, mut is_doubtful) = ([leg.response, leg.drive], false);
-        // The last level whose drive is within the limits of a lock.
-        let mut good = (!is_another(leg.drive - self.requested, 0.0, self.requested)).then_some(leg.response);
+        let mut at = [leg.response, leg.drive];
         for count in 0.. {
             let largest = step * at[0];
             let to = at[0] + ((self.requested - at[1]) / slope).clamp(-largest, largest);
-            // A change may disturb the motion for a while.
-            let to = if is_doubtful { good.unwrap_or(to) } else { to };
             let criterion = self.criterion();
             let Level { estimate, cycles } = self.hold(to, &criterion)?;
-            let is_symmetric = self.is_symmetric(self.regime(&estimate, &cycles));
-            // What drifts only has a larger uncertainty.
-            let is_irregular = |why: &Unsteady| matches!(why, Unsteady::Scatter(_)) && !criterion.is_met(&estimate);
-            let irregular = estimate.unsteady.filter(is_irregular);
-            match irregular {
-                _ if is_symmetric && irregular.is_none() => {}
-                _ if !is_doubtful => {
-                    is_doubtful = true;
-                    continue;
-                }
-                Some(why) if is_symmetric => {
-                    let response = self.knowledge.target.units.response.quantity(estimate.response.value);
-                    return Err(ExperimentError::NotSteady { periods: cycles.len(), response, why });
-                }
-                _ => return Ok(false),
+            // A level need not show impacts: the legs have.
+            let regime = self.regime(&estimate, &cycles);
+            if !(self.is_symmetric(regime) || regime == Regime::NotEstablished) {
+                return Ok(false);
             }
             let next = [estimate.response.value, estimate.at[0].value];
             let is_within = !is_another(next[1] - self.requested, estimate.at[0].uncertainty, self.requested);
-            let is_close =
-                self.is_near(&estimate, self.requested) || is_within && (is_doubtful || count >= PRECISE_LEVELS);
+            let is_close = self.is_near(&estimate, self.requested) || is_within && count >= PRECISE_LEVELS;
             if is_close && self.is_in_phase(&estimate) {
-                return Ok(true);
+                return match estimate.unsteady {
+                    Some(why @ Unsteady::Scatter(_)) if !criterion.is_met(&estimate) => {
+                        let response = self.knowledge.target.units.response.quantity(estimate.response.value);
+                        Err(ExperimentError::NotSteady { periods: cycles.len(), response, why })
+                    }
+                    _ => Ok(true),
+                };
             }
-            good = is_within.then_some(next[0]).or(good);
-            is_doubtful = false;
             // Between near levels, noise can be larger than what changes.
             if (next[1] - at[1]).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
                 slope = (next[1] - at[1]) / (next[0] - at[0]);
@@ -562,13 +544,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             last: cycles[cycles.len() - 1].amplitude(),
             drive: drive.value,
             omega: omega.value,
-            // Harmonics above the third count as noise of a period, but do not scatter.
-            regime: regime_on_the_way(
-                samples,
-                self.knowledge,
-                [fit.response, drive, omega]
-                    .map(|one| Estimate::new(one.value, &[fit.excess.min(1.0) * one.uncertainty])),
-            ),
+            regime: regime_on_the_way(samples, self.knowledge, [fit.response, drive, omega]),
         };
         self.note(&leg);
         Ok(leg)
