@@ -46,11 +46,9 @@ progress() {
 rust_tool() {
     local tools=$target/tools
     export PATH="$tools/bin:$PATH"
-    case $("$tools/bin/$1" --version 2>/dev/null) in
-        *"$2") return ;;
-    esac
+    ! grep -qs "^\"$1 $2 " "$tools/.crates.toml" || return 0
     stage "Installing $1 $2 (some minutes)"
-    cargo install "$1" --quiet --locked --version "$2" --root "$tools" --target-dir "$tools/build" "${@:3}"
+    cargo install "$1" --quiet --locked --force --version "$2" --root "$tools" --target-dir "$tools/build" "${@:3}"
     rm -rf "$tools/build"
 }
 
