@@ -21,7 +21,7 @@ use vines_scene::scene::{PLACES, frequencies};
 use vines_scene::shaker_path::ShakerPath;
 
 /// Periods of a window, and most periods at a frequency.
-const STEADY_WINDOW: usize = 8;
+const STEADY_WINDOW: usize = 16;
 const MOST_PERIODS: f64 = 800.0;
 /// Largest relative change from window to window of a steady motion.
 const STEADY_CHANGE: f64 = 1e-4;
