@@ -20,13 +20,13 @@ for drive in np.repeat([1.5, 1.35, 1.25, 1.15], 20_000):
 
 # %% [markdown]
 # The sensors have noise of 0.3 % of their signals. `vines.read_recording` reads such channels from CSV, MAT, HDF5,
-# TDMS, UFF58 and LVM.
+# TDMS, UFF58 and LVM. The scene says what the sensor reads: here v, which is known of a simulation only.
 
 # %%
 random = np.random.default_rng(1)
 noisy = [np.array(one) + 0.003 * np.std(one) * random.normal(size=len(one)) for one in (response, base)]
 recording = vines.Recording("rig", ("response", "base"), lock.sample_time, *noisy, 0.0)
-fit = vines.fit_recordings(recording)
+fit = vines.fit_recordings(recording, vines.Scene(resonance={"sensor": "v"}))
 true = {"r": truth["r"], "b": truth["b"], "epsilon": truth["m"] / truth["M"]}
 for symbol, value in true.items():
     print(f"{symbol:8} {fit[symbol][0]:.5f} ± {fit[symbol][1]:.1e}, true {value:.5f}")

@@ -13,7 +13,7 @@ use vines_bench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment,
-    fit::{Known, MeasuredPoint, Measurements, Recording, Selection, find},
+    fit::{Known, MeasuredPoint, Measurements, Recording, Selection, find, requires_sensor},
     identification,
     linear::MeasuredLinear,
     rig::{BuiltIn, Simulated, Stoppable},
@@ -139,6 +139,9 @@ pub fn fit(
         calibration,
     };
     let (checked, scene) = (scene.scene.clone(), &scene.scene);
+    for foreign in measured.recordings.iter().filter(|one| !one.is_own) {
+        requires_sensor(&foreign.origin, scene).map_err(invalid)?;
+    }
     let found = calculate(py, move || {
         measured.points = vines_bench::survey::without_other_modes(&checked, measured.points);
         find(&measured, &checked, |_| {})
@@ -159,7 +162,7 @@ pub fn fit(
 /// What a drive measures that is no motion.
 const FORCE: &str = "force";
 
-/// A recording: origin, names of the channels, start and step (s), what both measure, response, base, and notes.
+/// A recording: origin, names of the channels, start and step (s), what both measure, response, base, whether `vines` wrote it, and notes.
 type RecordingTuple = (
     String,
     [String; 2],
@@ -167,6 +170,7 @@ type RecordingTuple = (
     [String; 2],
     Vec<f64>,
     Vec<f64>,
+    bool,
     Vec<String>,
 );
 
@@ -193,6 +197,7 @@ pub fn recording(
         of_force,
         response,
         drive,
+        is_own,
         notes,
     } = calculate(py, read)?.map_err(invalid)?;
     let [of_response, of_drive] = measurands.map(Measurand::name);
@@ -204,12 +209,13 @@ pub fn recording(
         measured.map(Into::into),
         response,
         drive,
+        is_own,
         notes,
     ))
 }
 
 fn recording_of(
-    (origin, channels, [start, sample_time], measured, response, drive, notes): RecordingTuple,
+    (origin, channels, [start, sample_time], measured, response, drive, is_own, notes): RecordingTuple,
 ) -> PyResult<Recording> {
     let of_force = measured[1] == FORCE;
     let measurand = |name: &str| {
@@ -235,6 +241,7 @@ fn recording_of(
         of_force,
         response,
         drive,
+        is_own,
         notes,
     })
 }

@@ -3,7 +3,10 @@
 use std::fmt::Display;
 
 use pyo3::{exceptions::PyValueError, prelude::*};
-use vines_bench::scene::{Family, Override, SceneError};
+use vines_bench::{
+    fit::requires_sensor,
+    scene::{Family, Override, SceneError},
+};
 
 /// A `ValueError`, whose message has the value, its unit and what is allowed.
 pub fn invalid(error: impl Display) -> PyErr {
@@ -67,6 +70,11 @@ impl Scene {
     /// epsilon, lambda, r, G, omega0 and b, as JSON.
     fn dimensionless(&self) -> PyResult<String> {
         json(&self.scene.dimensionless())
+    }
+
+    /// Refuses what `vines` has not measured, unless the scene says what the sensor of the response reads.
+    fn requires_sensor(&self, origin: &str) -> PyResult<()> {
+        requires_sensor(origin, &self.scene).map_err(invalid)
     }
 
     /// The unit in which the drive of the scene is measured: m of a base, N of a force.

@@ -107,6 +107,14 @@ def test_the_linear_response_is_data_if_one_state_of_the_particle_agrees(points)
     assert fit.linear[0]["linear"]["f0_Hz"] == f0
 
 
+def test_points_of_another_program_need_a_scene_that_says_what_the_sensor_reads(points):
+    foreign = {name: points[name] for name in ("f_Hz", "A_m", "E_m", "u_f_Hz", "u_A_m", "u_E_m")}
+    with pytest.raises(ValueError, match=r'resonance\.sensor = "q1"'):
+        vines.fit(foreign)
+    fit = vines.fit(foreign, vines.Scene(resonance={"sensor": "v"}))
+    assert fit["b"] == vines.fit(points)["b"]
+
+
 def test_rows_locks_and_columns_that_are_missing(points):
     first = {name: values[0] for name, values in points.items()}
     with pytest.raises(ValueError, match="no column u_E_m"):

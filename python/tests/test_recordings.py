@@ -83,7 +83,8 @@ def test_two_formats_give_the_same_fit(channels, tmp_path):
     np.savetxt(tmp_path / "record.csv", table, delimiter=",", header="time,y,x", comments="", fmt="%.17g")
     scipy.io.savemat(tmp_path / "record.mat", {"t": time, "y": response, "x": drive})
     names = ("record.csv", "record.mat")
-    fits = [vines.fit_recordings(vines.read_recording(tmp_path / name, "y:mm", "x:um")) for name in names]
+    scene = vines.Scene(resonance={"sensor": "v"})
+    fits = [vines.fit_recordings(vines.read_recording(tmp_path / name, "y:mm", "x:um"), scene) for name in names]
     for name in ("value", "uncertainty"):
         assert np.array_equal(*(fit.parameters[name] for fit in fits))
     held = [one for one in fits[0].stretches if one["motion"] == "1:1"]
@@ -264,7 +265,7 @@ def test_accelerations_of_another_simulator_in_12_bits_with_hum_offset_and_drift
     for symbol, truth in (("r", foreign.HIDDEN["r"]), ("epsilon", foreign.HIDDEN["m"] / foreign.HIDDEN["M"])):
         value, uncertainty = fit[symbol]
         assert abs(value - truth) < 3 * uncertainty < 0.1 * value
-    # What no accelerometer reads is refused with the key to set.
+    # The default v is what no accelerometer reads: a file of another program is refused with the key to set.
     with pytest.raises(ValueError, match=r'resonance\.sensor = "q1"'):
         vines.fit_recordings(read)
 

@@ -114,7 +114,8 @@ def fit(
         (degrees) says at which phase of the response relative to the base they were measured; without it, it is the
         scene's controller.phase_target.
     scene : Scene, optional
-        Where the search begins; default: the default scene.
+        Where the search begins; default: the default scene. For points that vines has not measured, it says what the
+        sensor reads: `Scene(resonance={"sensor": "q1"})`.
     known : mapping, optional
         Values from elsewhere by their symbols f0 (Hz), zeta, r, b (m), epsilon, M, m (kg), k (N/m) and c (N s/m), and
         strengths of hypotheses: mu (friction), theta (tilt, degrees), k_r (viscoelastic, (s/m)^(1/5)), v_y (plastic,
@@ -133,7 +134,7 @@ def fit(
     Raises
     ------
     ValueError
-        Too few points, a missing column, or a value that is not allowed.
+        Too few points, a missing column, a value that is not allowed, or a scene that does not say what the sensor reads.
 
     Examples
     --------
@@ -160,6 +161,8 @@ def fit(
         for name, words in _MOTIONS.items():
             if name in table:
                 kept &= np.isin(np.atleast_1d(np.asarray(table[name])), words)
+        if not ({"C", "sigma"} <= set(table)):
+            given.requires_sensor("the points")
         columns.append(np.full(columns[0].shape, math.nan))
         if "phase_target_deg" in table:
             columns[-1][:] = table["phase_target_deg"]
@@ -187,7 +190,8 @@ def fit_recordings(
     recordings : Recording or iterable of Recording
         What `read_recording` returns, or two channels of your own as a `Recording`.
     scene : Scene, optional
-        What the sensors read, and about which rig was recorded: f0 within 1 %, b within 10 %, masses within 15 %.
+        What the sensors read, and about which rig was recorded: f0 within 1 %, b within 10 %, masses within 15 %. For
+        recordings that vines has not made, it needs `resonance.sensor`: `Scene(resonance={"sensor": "q1"})`.
     known, calibration : optional
         As of `fit`.
 

@@ -49,6 +49,8 @@ class Recording:
         What response and base are: "displacement", "velocity" or "acceleration"; the drive may be a "force".
     notes : tuple of str
         What is to be known of the way it was read: the clock, and what was cut or interpolated.
+    own : bool
+        Whether a run of vines wrote it, whose scene says what the sensor of the response reads.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class Recording:
     start: float = 0.0
     measured: tuple[str, str] = ("displacement", "displacement")
     notes: tuple[str, ...] = ()
+    own: bool = False
 
     def __post_init__(self) -> None:
         kinds = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²", "force": "N"}
@@ -76,7 +79,7 @@ class Recording:
     def _tuple(self) -> tuple[Any, ...]:
         clock = [self.start, self.sample_time]
         values = self.response, self.drive
-        return self.origin, list(self.channels), clock, list(self.measured), *values, list(self.notes)
+        return self.origin, list(self.channels), clock, list(self.measured), *values, self.own, list(self.notes)
 
 
 @dataclass(frozen=True)
@@ -161,11 +164,11 @@ def read_recording(
         None if one is None else real(one, unit, name)
         for one, unit, name in ((rate, "Hz", "rate"), (late, "s", "late"))
     )
-    origin, names, (start, step), measured, y, x, notes = _native.recording(
+    origin, names, (start, step), measured, y, x, own, notes = _native.recording(
         str(path), contents, [response, drive, time], *numbers
     )
     pair = (measured[0], measured[1])
-    return Recording(origin, (names[0], names[1]), step, np.array(y), np.array(x), start, pair, tuple(notes))
+    return Recording(origin, (names[0], names[1]), step, np.array(y), np.array(x), start, pair, tuple(notes), own)
 
 
 def contents_of(path: str | PathLike[str]) -> bytes | tuple[Any, ...]:

@@ -52,6 +52,21 @@ pub fn decimals(uncertainty: f64) -> usize {
     }
 }
 
+/// Asks what the sensor of the response reads, of a measurement that `vines` has not made: the default scene reads v, which no sensor on a structure
+/// shows, and the results would be wrong by several standard uncertainties.
+///
+/// # Errors
+/// A scene that does not say it.
+pub fn requires_sensor(origin: &str, scene: &Scene) -> Result<(), RecordingError> {
+    let unstated = || {
+        RecordingError::new(format!(
+            "{origin}: what does the sensor of the response read? It is not from `vines`, and the scene does not say it: set resonance.sensor = \"q1\" \
+             for a sensor on the structure (in the file of --scene, or --set resonance.sensor=q1), or \"v\" for q1 + m/M q2"
+        ))
+    };
+    scene.states_sensor.then_some(()).ok_or_else(unstated)
+}
+
 /// What was measured on a rig.
 #[derive(Debug, Clone)]
 pub struct Measurements {

@@ -498,6 +498,7 @@ fn recorded_on(rig: Parameters, settings: &str) -> Recording {
         start: 0.0,
         measurands: scene.resonance.measurands(),
         of_force: false,
+        is_own: true,
         notes: Vec::new(),
         sample_time: scene.sample_time(),
         response: kept.iter().map(|one| one.response).collect(),

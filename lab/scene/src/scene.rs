@@ -94,6 +94,9 @@ pub struct Scene {
     pub chain: ChainSettings,
     /// What counts as resonance, and what is measured.
     pub resonance: Definition,
+    /// Whether the user says what the sensor of the response reads, v or q1: the default scene does not say it of a rig that exists.
+    #[serde(skip)]
+    pub states_sensor: bool,
     /// What a rig other than the simulated one calls its variables.
     #[serde(skip_serializing_if = "Names::is_empty")]
     pub rig_names: Names,
@@ -287,6 +290,9 @@ struct Sections {
     resonance: Definition,
     rig: RigSection,
     controller_names: Names,
+    /// As of [`Scene`].
+    #[serde(skip)]
+    states_sensor: bool,
 }
 
 /// A rig other than the simulated one.
@@ -304,6 +310,7 @@ impl Sections {
         if let Some(structure) = &structure {
             self.plant = self.plant.of_structure(origin, structure)?;
             resonance.sensor = Sensor::Q1;
+            self.states_sensor = true;
         }
         let plant = self.plant.resolve(origin)?;
         let numbers = Dimensionless::of(&plant, 0.0);
@@ -318,6 +325,7 @@ impl Sections {
             backbone: self.backbone,
             chain: self.chain,
             resonance,
+            states_sensor: self.states_sensor,
             rig_names: self.rig.names,
             controller_names: self.controller_names,
         };

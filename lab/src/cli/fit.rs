@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use vines::fit::{
     CALIBRATION, FitReport, FittedParameter, Found, Hypothesis, HypothesisReport, Known, LinearVerdict, Measurements,
-    Selection, Stretch, decimals, find,
+    Selection, Stretch, decimals, find, requires_sensor,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
@@ -35,7 +35,7 @@ a file of `vines` needs no options. `python -m vines fit` has the same options, 
 m/s², g) or a multiple of it (-1g), the sensitivity of a sensor (100mV/g, 8V/mm, 125mm/s/V), or metres per unit. Velocities and accelerations
 become displacements. The recording gives drive and frequency of phase resonance over the amplitude, with their covariance, from held levels, sweeps
 and decays alike, at any phase. The scene says what the sensor reads, and about which rig was recorded: f0 within 1 %, b within 10 %, masses within
-15 %.
+15 %. Tables and recordings that `vines` has not written need resonance.sensor there or in --set: q1 for a sensor on the structure.
 
 The linear response of the structure is data as well, for the state of the particle (carried along or free) that agrees with the points. It
 comes from tracked.csv, tracked.json or identification.json of a rig that was checked, from `vines check --json`, or from a recording of a
@@ -58,8 +58,8 @@ Examples:
   vines fit out/tracked.csv
   vines fit out/tracked.csv out/identification.json --known m=0.032±0.0005
   vines fit out/tracked.csv ringdown.csv --response y:mm
-  vines fit record.csv --response y:mm --drive x:um --rate 5000 --scene mine.toml
-  vines fit table.csv --column A=amplitude:mm --column E=base:um --column f=frequency:Hz --column u_A=noise:mm --column u_E=noise_e:um --column u_f=noise_f:Hz
+  vines fit record.csv --response y:mm --drive x:um --rate 5000 --set resonance.sensor=q1
+  vines fit table.csv --scene mine.toml --column A=amplitude:mm --column E=base:um --column f=frequency:Hz --column u_A=noise:mm --column u_E=noise_e:um --column u_f=noise_f:Hz
   vines fit out/tracked.csv --out rig.toml      a scene with the fitted plant, for every other command";
 
 /// Fit the parameters of a rig to measured points of its backbone
@@ -187,7 +187,7 @@ fn gathered(
         let reading = Reading {
             columns: &arguments.column,
             phase: scene.definition().phase,
-            units: scene.units(),
+            scene,
         };
         let source = read(path).map_err(Failure::input)?;
         match measurement(path, source, reading, &selection).map_err(Failure::input)? {
@@ -210,7 +210,12 @@ fn gathered(
                         notes.push(format!("{}: {decay}", recording.origin));
                         measured.linear.push(decay.into());
                     }
-                    None => measured.recordings.push(recording),
+                    None => {
+                        if !recording.is_own {
+                            requires_sensor(&recording.origin, scene).map_err(Failure::input)?;
+                        }
+                        measured.recordings.push(recording);
+                    }
                 }
             }
         }

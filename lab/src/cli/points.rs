@@ -9,11 +9,11 @@ use std::str::FromStr;
 use serde::Deserialize;
 use serde_json::Value;
 use vines::ArgumentError;
-use vines::fit::{Contents, MeasuredPoint, Recording, RecordingError, Selection, plain_table};
+use vines::fit::{Contents, MeasuredPoint, Recording, RecordingError, Selection, plain_table, requires_sensor};
 use vines::identification::Regime;
 use vines::linear::MeasuredLinear;
 use vines::numerics::Estimate;
-use vines::scene::{Measurand, Name, Units, phase_target};
+use vines::scene::{Measurand, Name, Scene, phase_target};
 
 /// Quantities of a point, the columns that have them, and their units.
 const COLUMNS: [(&str, &str, &str); 6] = [
@@ -25,6 +25,8 @@ const COLUMNS: [(&str, &str, &str); 6] = [
     ("u_E", "u_E_m", "m"),
 ];
 
+/// Columns of results of `vines`, which only a scene gives.
+const OWN: [&str; 2] = ["C", "sigma"];
 /// Columns of a drive by force.
 const FORCE: [(&str, &str, &str); 2] = [("E", "F_N", "N"), ("u_E", "u_F_N", "N")];
 
@@ -142,8 +144,8 @@ pub(super) struct Reading<'a> {
     pub columns: &'a [Column],
     /// At which phase points were measured that do not say it, rad.
     pub phase: f64,
-    /// The units of the channels.
-    pub units: Units,
+    /// The scene, for the units of the channels.
+    pub scene: &'a Scene,
 }
 
 /// What is measured in a file: points if it has one of their columns or `reading` names some, otherwise a recording.
@@ -164,6 +166,9 @@ pub(super) fn measurement(
     let is_named = selection.response.is_some() || selection.drive.is_some();
     let has_points = !reading.columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| contents.unit(name).is_some());
     if has_points && !is_named {
+        if !OWN.iter().all(|name| contents.unit(name).is_some()) {
+            requires_sensor(&contents.origin, reading.scene).map_err(refused)?;
+        }
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
         let rows: Vec<Row> = contents.rows().map(row).collect();
         return points(path, &rows, reading, rows.first().and_then(linear_of), |column| {
@@ -311,9 +316,10 @@ fn point<'a>(
     path: &Path,
     number: usize,
     row: &Row,
-    Reading { columns, phase, units }: Reading<'_>,
+    Reading { columns, phase, scene }: Reading<'_>,
     stated: &impl Fn(&str) -> &'a str,
 ) -> Result<MeasuredPoint, ArgumentError> {
+    let units = scene.units();
     let is_forced = units.reference.symbol == "N";
     // The value in SI units, and how often a displacement is differentiated.
     let value = |(quantity, column, unit): (&str, &str, &str)| {

@@ -383,10 +383,40 @@ fn table_of_points(head: &str, cells: impl Fn(usize) -> String, [delimiter, mark
 }
 
 #[test]
+fn a_file_of_another_program_is_refused_until_the_scene_says_what_its_sensor_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let [table, recording] = ["table.csv", "recording.csv"].map(|name| folder.path().join(name));
+    fs::write(&table, table_of_points("settled", |n| (n < 8).to_string(), [",", "."])).unwrap();
+    let rows = (0..4000).map(|n| {
+        let turn = 0.11 * n as f64;
+        format!("{},{},{}\n", 0.002 * n as f64, 3.0 * turn.sin(), 20.0 * turn.cos())
+    });
+    fs::write(&recording, format!("time,y,x\n{}", rows.collect::<String>())).unwrap();
+    let scene = folder.path().join("scene.toml");
+    fs::write(
+        &scene,
+        "[plant]\nM = 3.807\nk = 11680\nc = 2.53\nm = 0.032\nb = 0.01\nr = 0.65\n[excitation]\nG = 1.1\n",
+    )
+    .unwrap();
+    for file in [
+        table.display().to_string(),
+        format!("{} --response y:mm --drive x:um", recording.display()),
+    ] {
+        for scene in [String::new(), format!(" --scene {}", scene.display())] {
+            fails(&format!("fit {file}{scene}"), 2, "set resonance.sensor = \"q1\"");
+        }
+    }
+    assert_eq!(
+        json(&format!("fit {} --set resonance.sensor=v --json", table.display()))["describes"],
+        true
+    );
+}
+
+#[test]
 fn truth_values_of_tables_are_read_in_every_dialect_and_unknown_words_are_refused_with_their_row() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("table.csv");
-    let out = file.display();
+    let out = format!("{} --set resonance.sensor=v", file.display());
     for (words, layout) in [
         (["true", "false"], [",", "."]),
         (["True", "False"], [",", "."]),

@@ -161,6 +161,7 @@ impl File<'_> {
             measurands: [response.unit, drive.unit].map(|unit| Measurand::of_unit(&unit).unwrap_or_default()),
             response: response.values,
             drive: drive.values,
+            is_own: selection.response.is_none() && selection.drive.is_none() && self.is_of_vines(),
             notes,
         })
     }

@@ -39,6 +39,8 @@ pub struct Recording {
     pub response: Vec<f64>,
     /// Motion of the base, m, m/s or m/s², or force, N; zeros without a channel of the base, whose name is empty then.
     pub drive: Vec<f64>,
+    /// Whether a run of `vines` wrote it, whose scene says what the sensor of the response reads.
+    pub is_own: bool,
     /// What is to be known of the way it was read: the clock, and what was cut or interpolated.
     pub notes: Vec<String>,
 }

@@ -103,7 +103,17 @@ pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(
     // The file is checked on its own first, so that an error can name the line.
     toml::from_str::<Sections>(text).map_err(syntax)?;
     let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;
-    Ok((Sections::deserialize(table.clone()).map_err(syntax)?, table))
+    let mut sections = Sections::deserialize(table.clone()).map_err(syntax)?;
+    sections.states_sensor = states_sensor(text, &table, overrides);
+    Ok((sections, table))
+}
+
+/// Whether a scene other than the default one, or an override, has `resonance.sensor`.
+fn states_sensor(text: &str, table: &Table, overrides: &[Override]) -> bool {
+    let is_in_table = table
+        .get("resonance")
+        .is_some_and(|section| section.get("sensor").is_some());
+    text != PAPER && is_in_table || overrides.iter().any(|change| change.is("resonance", "sensor"))
 }
 
 // A scene some of whose numbers vary.
@@ -114,6 +124,8 @@ pub struct Family {
     origin: String,
     /// The file with its overrides.
     table: Table,
+    /// As of [`Scene`].
+    states_sensor: bool,
     /// Section and key of every number that varies.
     keys: Vec<[String; 2]>,
 }
@@ -123,8 +135,15 @@ impl Family {
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
         let (sections, table) = read(origin, text, overrides)?;
-        sections.resolve(origin, &table)?.check_controller()?;
-        Ok(Self { origin: origin.into(), table, keys: Vec::new() })
+        let scene = sections.resolve(origin, &table)?;
+        scene.check_controller()?;
+        let states_sensor = scene.states_sensor;
+        Ok(Self {
+            origin: origin.into(),
+            table,
+            states_sensor,
+            keys: Vec::new(),
+        })
     }
 
     /// Lets the number under `section.key` vary too.
@@ -150,7 +169,8 @@ impl Family {
             }
         }
         let refused = |error: toml::de::Error| SceneError::text(&self.origin, plain(error.message()));
-        let sections = Sections::deserialize(table.clone()).map_err(refused)?;
+        let mut sections = Sections::deserialize(table.clone()).map_err(refused)?;
+        sections.states_sensor = self.states_sensor;
         sections.resolve(&self.origin, &table)
     }
 }
