@@ -194,6 +194,7 @@ pub fn recording(response: Vec<f64>, drive: Vec<f64>, sample_time: f64) -> Recor
         sample_time,
         measurands: [Measurand::Displacement; 2],
         of_force: false,
+        is_own: true,
         response,
         drive,
         notes: Vec::new(),
