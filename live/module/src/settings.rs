@@ -45,6 +45,7 @@ pub fn default_scene() -> Scene {
         controller_names: Names::default(),
         chain: ChainSettings::default(),
         resonance: Definition::default(),
+        states_sensor: false,
     }
 }
 
