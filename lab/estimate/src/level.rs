@@ -280,7 +280,7 @@ impl Level {
         (sum / degrees).cbrt() <= 1.0 - variance + SURE * variance.sqrt()
     }
 
-    /// Correlation of neighbouring periods over what noise would have: beyond [`SURE`], the motion does something else than the model.
+    /// Correlation of neighbouring periods over what noise would have: beyond three standard deviations, the motion does something else than the model.
     pub fn correlation(&self) -> f64 {
         let pairs = self.innovations.iter().zip(&self.innovations[2..]);
         pairs.map(|(a, b)| a * b).sum::<f64>() / (self.innovations.len() as f64).sqrt()

@@ -86,36 +86,25 @@ impl ResonanceFit {
         };
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
-        let turned = |(z, time): (Complex<f64>, &f64)| z - Complex::new(0.0, omega * time);
-        let logarithms: Vec<_> = motion
-            .iter()
-            .zip(&drives)
-            .map(logarithm)
-            .zip(&time)
-            .map(turned)
-            .collect();
+        let in_frame = |(both, time)| logarithm(both) - Complex::new(0.0, omega * time);
+        let logarithms: Vec<_> = motion.iter().zip(&drives).zip(&time).map(in_frame).collect();
         let lead = lead(knowledge, base / response);
         let rate = |(cycle, drive): (&PeriodResponse, &Complex<f64>)| {
             let force = (drive * Complex::cis(target)).conj() + lead * target.cos() * drive.im;
             force * (gain / cycle.amplitude)
         };
         let rates: Vec<_> = motion.iter().zip(&drives).map(rate).collect();
-        let mut disturbances = vec![Disturbance { rates: rates.clone(), deviation: u_gain }];
-        disturbances.retain(|growth| growth.deviation > 0.0);
         let is_measured = knowledge.target.through_shaker;
+        // Behind a shaker what is read is the force itself, with its noise from period to period.
+        let (sensor, process) = match is_measured {
+            true => (0.0, gain * base_noise / response),
+            false => (base_noise / (base * n.sqrt()), 0.0),
+        };
+        let mut disturbances = calibrations(&rates, [u_gain, sensor]);
         if is_measured {
-            disturbances.extend(aliases(
-                cycles,
-                knowledge,
-                gain * Complex::cis(knowledge.target.phase - target),
-            ));
-        } else if base_noise > 0.0 {
-            let deviation = base_noise / (base * n.sqrt());
-            let turned = |part: Complex<f64>| rates.iter().map(|rate| part * rate).collect();
-            disturbances
-                .extend([Complex::ONE, Complex::i()].map(|part| Disturbance { rates: turned(part), deviation }));
+            let growth = gain * Complex::cis(knowledge.target.phase - target);
+            disturbances.extend(aliases(cycles, knowledge, growth));
         }
-        let process = if is_measured { gain * base_noise / response } else { 0.0 };
         let mean_before = mean(logarithms.iter().map(|z| z.re));
         let rings = knowledge.rings.into_iter().flatten().filter(|_| is_held);
         let level = Level::of(&Motion {
@@ -125,15 +114,7 @@ impl ResonanceFit {
             noise: [(noise / response).hypot(SMALLEST_DISTURBANCE), process].map(|deviation| deviation * deviation),
             disturbances,
             rings: rings.map(|pole| pole - Complex::new(0.0, omega)).collect(),
-            slope: slopes.map(|[by_drive, by_omega]| {
-                let (scale, tangent) = (gain * target.cos(), target.tan());
-                let real = [scale * (base / response - by_drive.value), scale * by_drive.uncertainty];
-                let imaginary = [
-                    response * by_omega.value - tangent * real[0],
-                    response * by_omega.uncertainty,
-                ];
-                [real, [imaginary[0], imaginary[1].hypot(tangent * real[1])]]
-            }),
+            slope: slopes.map(|slopes| expected(slopes, base / response, gain, response, target)),
             lag: if is_held { LAG * TAU / omega } else { 0.0 },
         })?;
         let phase_noise = (noise / response).hypot(base_noise / base);
@@ -181,6 +162,18 @@ impl ResonanceFit {
     }
 }
 
+/// Expected components of Lambda1 and their standard deviations, 1/s, from the slopes of drive and frequency over the amplitude; `relative`: drive over
+/// amplitude.
+fn expected([drive, omega]: [Estimate; 2], relative: f64, gain: f64, response: f64, target: f64) -> [[f64; 2]; 2] {
+    let (scale, tangent) = (gain * target.cos(), target.tan());
+    let [real, u_real] = [scale * (relative - drive.value), scale * drive.uncertainty];
+    let imaginary = response * omega.value - tangent * real;
+    [
+        [real, u_real],
+        [imaginary, (response * omega.uncertainty).hypot(tangent * u_real)],
+    ]
+}
+
 /// At equal amplitude, the drive belongs to another frequency than `omega_R` by `omega E sin phi/(2 A)`. It grows with the frequency: against damping
 /// with omega, of v with its third power where the base moves the damper's other end; against impacts, of q1, with its square.
 fn lead(knowledge: &Knowledge, relative: f64) -> f64 {
@@ -195,6 +188,17 @@ fn lead(knowledge: &Knowledge, relative: f64) -> f64 {
         Reference::Force => -zeta,
     };
     of_sensor + of_reference
+}
+
+/// Common factors of the drive: of g, and of what the sensor of the reference reads, by their relative uncertainties, as far as these are not zero.
+fn calibrations(rates: &[Complex<f64>], [growth, sensor]: [f64; 2]) -> Vec<Disturbance> {
+    let parts: [(Complex<f64>, f64); 3] = [(Complex::ONE, growth), (Complex::ONE, sensor), (Complex::i(), sensor)];
+    let uncertain = parts.into_iter().filter(|(_, deviation)| *deviation > 0.0);
+    let factor = |(part, deviation): (Complex<f64>, f64)| Disturbance {
+        rates: rates.iter().map(|rate| part * rate).collect(),
+        deviation,
+    };
+    uncertain.map(factor).collect()
 }
 
 /// What the edges of a shaker's force alias into its fundamental; `growth`: growth rate of the response by the force, with its phase.
