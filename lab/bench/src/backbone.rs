@@ -6,9 +6,11 @@
 //! so that the loops have little to correct.
 
 use std::f64::consts::{PI, TAU};
+use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
 use vines_model::numerics::Estimate;
+use vines_rig::unit::Quantity;
 
 use crate::experiment::{self, CONFIRMED, ExperimentError, FOLLOWED, SLOWEST_LOOP, Search, Stage};
 use crate::identification::{
@@ -98,8 +100,41 @@ pub struct Tracked {
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
     pub periods: f64,
-    /// Why tracking ended before the last level; absent if it did not.
+    /// Where the curve ended before the last level; absent if it did not.
+    pub end: Option<CurveEnd>,
+    /// Why tracking failed before the last level; absent if it did not.
     pub ended: Option<ExperimentError>,
+}
+
+/// Where a backbone ends: at its fold, or where the motion changes otherwise.
+#[derive(Debug, Clone, Copy)]
+pub struct CurveEnd {
+    /// The last response with the 1:1 motion, and the level without it.
+    pub between: [Quantity; 2],
+    /// Both over the half-width.
+    pub c: [f64; 2],
+    /// The motion at the level.
+    pub regime: Regime,
+    /// The rig does not report impacts: nothing is then said of a particle.
+    pub is_silent: bool,
+}
+
+impl Display for CurveEnd {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let ([held, level], [c, beyond]) = (self.between, self.c);
+        match self.is_silent {
+            true => write!(
+                f,
+                "The backbone ends between responses of {held:.4e} and {level:.4e}: the motion there is {}",
+                self.regime.motion()
+            ),
+            false => write!(
+                f,
+                "The backbone ends between C = {c:.4} and C = {beyond:.4}: the motion there is {}",
+                self.regime
+            ),
+        }
+    }
 }
 
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
@@ -162,17 +197,19 @@ pub fn track_into(
     tracker.approach()?;
     let periods_to_lock = tracker.run.periods;
     tracker.stage = Stage::Tracking;
-    let mut ended = tracker.follow(progress).err();
-    // What was measured is kept.
-    if let Some(error) = ended.take_if(|_| tracker.points.is_empty()) {
-        return Err(error);
-    }
+    let (end, ended) = match tracker.follow(progress) {
+        // What was measured is kept.
+        Err(error) if tracker.points.is_empty() => return Err(error),
+        Err(error) => (None, Some(error)),
+        Ok(end) => (end, None),
+    };
     let (points, periods) = (std::mem::take(&mut tracker.points), tracker.run.periods);
     Ok(Tracked {
         knowledge: plan.knowledge,
         points,
         periods_to_lock,
         periods,
+        end,
         ended,
     })
 }
@@ -196,8 +233,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
         Ok(())
     }
 
-    /// Goes through the levels.
-    fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<(), ExperimentError> {
+    /// Goes through the levels. Returns where the curve ended before the last one.
+    fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<Option<CurveEnd>, ExperimentError> {
         let levels = &self.plan.levels;
         for (n, &level) in levels.iter().enumerate() {
             progress(n, levels.len());
@@ -214,21 +251,19 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
             let Some((held, Regime::Symmetric | Regime::Unresolved)) = before else {
                 continue;
             };
-            let (response, b) = (self.plan.knowledge.target.units.response, self.plan.knowledge.numbers.b);
-            let (c, [held, level]) = (
-                [held / b, level / b],
-                [held, level].map(|metres| response.quantity(metres)),
-            );
             // Only where impacts are reported does a motion without them mean that they have ended.
-            match (point.regime, point.regime_by_impacts) {
-                (regime @ (Regime::NoImpacts | Regime::Other), Some(_)) => {
-                    return Err(ExperimentError::MotionLost { held, level, c, regime });
-                }
-                (Regime::Other, None) => return Err(ExperimentError::SteadyLost { held, level }),
-                _ => {}
+            let is_silent = point.regime_by_impacts.is_none();
+            if point.regime == Regime::Other || point.regime == Regime::NoImpacts && !is_silent {
+                let Knowledge { target, numbers, .. } = &self.plan.knowledge;
+                return Ok(Some(CurveEnd {
+                    between: [held, level].map(|metres| target.units.response.quantity(metres)),
+                    c: [held, level].map(|metres| metres / numbers.b),
+                    regime: point.regime,
+                    is_silent,
+                }));
             }
         }
-        Ok(())
+        Ok(None)
     }
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.

@@ -277,18 +277,6 @@ pub enum ExperimentError {
         fault: Fault,
         evidence: Box<Evidence>,
     },
-    #[error(
-        "the 1:1 motion, held at {held:.4e} (C = {:.4}), is {regime} at {level:.4e} (C = {:.4}): the backbone ends between the two, or the \
-         step was too large",
-        c[0], c[1]
-    )]
-    MotionLost {
-        held: Quantity,
-        level: Quantity,
-        /// Both over the half-width.
-        c: [f64; 2],
-        regime: crate::identification::Regime,
-    },
     #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
     OtherThanAsked { departure: Departure, error: Box<Self> },
     #[error(
@@ -315,10 +303,6 @@ pub enum ExperimentError {
         drive: Drive,
         requested: Quantity,
     },
-    #[error(
-        "the motion, steady at a response of {held:.4e}, is irregular at {level:.4e}: it ends between the two, or the step was too large"
-    )]
-    SteadyLost { held: Quantity, level: Quantity },
     #[error("the scene has no drive, so that nothing can lock")]
     NoDrive,
     #[error("the controller answered {name} = {value}; it must be {allowed}. The drive is off")]

@@ -71,6 +71,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         };
         text += &format!("{settled} of {of} points are settled points of {motion}\n");
     }
+    if let Some(end) = &result.end {
+        text += &format!("{end}\n");
+    }
     if tracked.ended.is_none()
         && let Some(found) = contradiction(&scene, points)
     {

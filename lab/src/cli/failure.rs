@@ -151,10 +151,6 @@ impl From<ExperimentError> for Failure {
                 "; see phase_lock.acquire_timeout and the [controller] section"
             }
             ExperimentError::NoLock { .. } => "; make the loop slower, or set a larger value",
-            ExperimentError::MotionLost { .. } => "; set backbone.C_to nearer to the former, or more backbone.points",
-            ExperimentError::SteadyLost { .. } => {
-                "; set backbone.C_to (over the half-width) nearer to the former, or more backbone.points"
-            }
             ExperimentError::NoDrive => ": set G, E or F of [excitation] above 0",
             _ => "",
         };
