@@ -130,7 +130,7 @@ impl Display for CurveEnd {
             ),
             false => write!(
                 f,
-                "The backbone ends between C = {c:.4} and C = {beyond:.4}: the motion there is {}",
+                "The backbone ends between {held:.4e} (C = {c:.4}) and {level:.4e} (C = {beyond:.4}): the motion there is {}",
                 self.regime
             ),
         }

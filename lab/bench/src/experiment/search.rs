@@ -531,16 +531,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
             even: squares,
         };
-        self.note(&leg, fit.unsteady().is_none());
+        self.note(&leg);
         Ok(leg)
     }
 
-    /// Notes a leg for the words of a search without a result; one that noise does not explain may resemble impacts.
-    fn note(&mut self, leg: &Leg, is_explained: bool) {
+    /// Notes a leg for the words of a search without a result.
+    fn note(&mut self, leg: &Leg) {
         self.tried = range(self.tried, [leg.response]);
-        if !is_explained {
-            return;
-        }
         self.impacts |= leg.departed;
         if !leg.symmetric {
             return;
