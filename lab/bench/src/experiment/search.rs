@@ -96,6 +96,8 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     /// Smallest and largest response of the legs, m, whether impacts have begun, and the symmetric leg with the drive nearest to the requested one.
     tried: (f64, f64),
     impacts: bool,
+    /// Whether a leg that noise does not explain needs them.
+    unexplained: bool,
     nearest: Option<Leg>,
     /// How often the motion was lost or not found, and whether one is to settle now, under a constant drive or not.
     lost: u32,
@@ -119,6 +121,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             held: (f64::INFINITY, 0.0),
             tried: (f64::INFINITY, 0.0),
             impacts: false,
+            unexplained: false,
             nearest: None,
             lost: 0,
             unsettled: None,
@@ -531,13 +534,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
             even: squares,
         };
-        self.note(&leg);
+        self.note(&leg, fit.unsteady().is_none());
         Ok(leg)
     }
 
-    /// Notes a leg for the words of a search without a result.
-    fn note(&mut self, leg: &Leg) {
+    /// Notes a leg for the words of a search without a result; one that noise does not explain may resemble impacts.
+    fn note(&mut self, leg: &Leg, is_explained: bool) {
         self.tried = range(self.tried, [leg.response]);
+        if !is_explained {
+            self.unexplained |= leg.departed;
+            return;
+        }
         self.impacts |= leg.departed;
         if !leg.symmetric {
             return;
@@ -560,7 +567,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let of = |leg: Leg| [d.excitation(leg.drive), leg.response / d.b, d.sigma(leg.omega)];
         let found = SearchFound {
             tried: [self.tried.0, self.tried.1].map(|response| response / d.b),
-            impacts: self.impacts,
+            impacts: self.impacts || is_silent && self.unexplained,
             held: self
                 .nearest
                 .map(|leg| ([low, high].map(|drive| d.excitation(drive)), of(leg))),

@@ -208,11 +208,11 @@ fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
         words.contains(&format!("C = 0.214 to {:.3} ", tried / b)),
         "{error} {words}"
     );
-    let (error, _) = ended(&frame(&["phase_lock.acquire_timeout=8"]), true, by_search);
+    let (error, _) = ended(&frame(&["phase_lock.acquire_timeout=35"]), true, by_search);
     let [(tried, "m"), (nearest, "m")] = with_units(&error)[..] else {
         panic!("{error}")
     };
-    assert!(nearest < tried && is_near(nearest, 0.8 * b), "{error}");
+    assert!(nearest < tried && is_near(nearest, 0.85 * b), "{error}");
     let (scene, log) = (
         frame(&["controller.phase_target=-80", "start.dq2=0"]),
         RefCell::default(),
