@@ -127,7 +127,8 @@ def test_the_command_line_is_that_of_the_program_for_every_option_and_format(tra
             file[name] = column
     lines = [",".join(f'"{value:.17g}"'.replace(".", ",") for value in row) for row in table]
     (tmp_path / "c.txt").write_text("\n".join([head, *lines]), encoding="utf-16")
-    options = ["--column", "A=response:mm", "--set", "plant.r=0.7", "--known", "m=0.032±0.0003"]
+    options = ["--column", "A=response:mm", "--set", "plant.r=0.7", "--set", "resonance.sensor=v"]
+    options += ["--known", "m=0.032±0.0003"]
     found = []
     for program, name in (([os.environ["VINES"]], "a.csv"), (PYTHON, "b.h5"), (PYTHON, "c.txt")):
         file = tmp_path / name

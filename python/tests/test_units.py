@@ -31,6 +31,8 @@ def array(values: Any, unit: str, **more: Any) -> xarray.DataArray:
 
 KINDS = {"quantity": Quantity, "DataArray": array}
 SCENE = vines.Scene()
+# Of points that vines has not measured, the scene says what the sensor reads.
+STATED = vines.Scene(resonance={"sensor": "v"})
 POINTS = {name: np.full(5, 1.0) for name in ("A_m", "u_A_m", "f_Hz", "u_f_Hz", "E_m", "u_E_m")}
 RECORDING = vines.Recording("mine", ("y", "x"), 1e-3, np.ones(3), np.ones(3))
 AXES = {"plant.r": [0.65]}
@@ -70,7 +72,7 @@ NUMBERS = {
     "PhaseLock.sample": (1e-3, lambda one: vines.PhaseLock(SCENE).sample(one), ("mm", 1e3)),
     "Scene": (0.02, lambda one: vines.Scene(plant={"b": one}), ("cm", 1e2)),
     "Scene.detuning": (55.0, lambda one: SCENE.detuning(one), ("rad/s", 1.0)),
-    "fit, points": (1.0, lambda one: vines.fit(POINTS | {"A_m": 5 * [one]}), ("mm", 1e3)),
+    "fit, points": (1.0, lambda one: vines.fit(POINTS | {"A_m": 5 * [one]}, STATED), ("mm", 1e3)),
     "fit, known": (0.01, lambda one: vines.fit(vines.backbone(SCENE).points, known={"b": (one, 1e-4)}), ("mm", 1e3)),
     "sweep": (0.01, lambda one: vines.sweep(None, {"plant.b": [one]}, periods=100), ("mm", 1e3)),
     "Recording": (2e-3, lambda one: vines.Recording("", ("y", "x"), one, [1.0], [1.0]).sample_time, ("ms", 1e3)),
@@ -83,7 +85,7 @@ PURE = {
     "Scene.drive, G": lambda one: SCENE.drive(0.0, one),
     "sweep, sigma": lambda one: vines.sweep(None, AXES, sigma=one, periods=100),
     "Plant, r": lambda one: vines.Plant(SCENE.settings["plant"] | {"r": one}),
-    "fit, known": lambda one: vines.fit(POINTS, known={"r": one}),
+    "fit, known": lambda one: vines.fit(POINTS, STATED, known={"r": one}),
 }
 
 

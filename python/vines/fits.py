@@ -134,7 +134,7 @@ def fit(
     Raises
     ------
     ValueError
-        Too few points, a missing column, a value that is not allowed, or a scene that does not say what the sensor reads.
+        Too few points, a missing column, a value that is not allowed, or a scene that does not say what the sensor is.
 
     Examples
     --------

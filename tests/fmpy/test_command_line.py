@@ -114,8 +114,8 @@ def test_fit_reads_recordings_and_says_what_is_wrong_with_one(call, tmp_path):
         (["gap.csv"], "gap.csv, row 3001: the time goes from"),
         (["record.mat"], "`python -m vines fit record.mat`"),
         (["run.csv", "--response", "z"], "run.csv has no channel `z`; it has time, response"),
-        (["run.csv", "--drive", "reference:-1"], "wrong sign"),
-        (["run.csv", "--drive", "response", "--response", "reference"], "swapped"),
+        (["run.csv", "--drive", "reference:-1", "--set", "resonance.sensor=v"], "wrong sign"),
+        (["run.csv", "--drive", "response", "--response", "reference", "--set", "resonance.sensor=v"], "swapped"),
     ):
         done = call("fit", *arguments)
         assert done.returncode != 0

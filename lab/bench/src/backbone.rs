@@ -9,6 +9,7 @@ use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
 use vines_model::numerics::Estimate;
+use vines_rig::unit::Quantity;
 
 use crate::experiment::{ControlLoop, ExperimentError, Level, Script, Stage, is_reached};
 use crate::identification::{
@@ -17,7 +18,6 @@ use crate::identification::{
 };
 use crate::record::Sample;
 use crate::rig::{Controller, Rig};
-use vines_rig::unit::Quantity;
 use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
 
@@ -128,7 +128,7 @@ impl Display for CurveEnd {
             ),
             false => write!(
                 f,
-                "The backbone ends between C = {c:.4} and C = {beyond:.4}: the motion there is {}",
+                "The backbone ends between {held:.4e} (C = {c:.4}) and {level:.4e} (C = {beyond:.4}): the motion there is {}",
                 self.regime
             ),
         }
@@ -210,13 +210,15 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
             let Some((held, Regime::Symmetric | Regime::Unresolved)) = before else {
                 continue;
             };
-            if matches!(point.regime, Regime::NoImpacts | Regime::Other) {
+            // Only where impacts are reported does a motion without them mean that they have ended.
+            let is_silent = point.regime_by_impacts.is_none();
+            if point.regime == Regime::Other || point.regime == Regime::NoImpacts && !is_silent {
                 let Knowledge { target, numbers, .. } = &self.plan.knowledge;
                 return Ok(Some(CurveEnd {
                     between: [held, level].map(|metres| target.units.response.quantity(metres)),
                     c: [held, level].map(|metres| metres / numbers.b),
                     regime: point.regime,
-                    is_silent: point.regime_by_impacts.is_none(),
+                    is_silent,
                 }));
             }
         }

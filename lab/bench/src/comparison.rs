@@ -373,6 +373,9 @@ pub struct TrackedComparison {
     /// The linear response, if it was measured on the rig.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub linear: Option<MeasuredLinear>,
+    /// Where the curve ended before the last level, in words; absent if it did not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end: Option<String>,
     /// The points, each beside the exact curve.
     pub points: Vec<TrackedPoint>,
     /// The exact backbone that the points are compared with.
@@ -416,6 +419,7 @@ impl TrackedComparison {
         let compare = |point: &LevelPoint| TrackedPoint { point: *point, exact: exact(point) };
         Self {
             points: tracked.points.iter().map(compare).collect(),
+            end: tracked.end.map(|end| end.to_string()),
             periods_to_lock: tracked.periods_to_lock,
             periods: tracked.periods,
             u_linear: knowledge.is_measured.then(|| {

@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         };
         text += &format!("{settled} of {of} points are settled points of {motion}\n");
     }
-    if let Some(end) = &tracked.end {
+    if let Some(end) = &result.end {
         text += &format!("{end}\n");
     }
     if tracked.ended.is_none()

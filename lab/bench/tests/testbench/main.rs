@@ -37,7 +37,9 @@ fn dimensionless(settings: &str) -> Scene {
 
 /// A preset of `scenes/` with these settings.
 fn preset(name: &str, settings: &[&str]) -> Result<Scene, SceneError> {
-    let file = format!("{}/../../scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    // The default scene is a part of the program.
+    let folder = if name == "paper" { "lab/scene" } else { "scenes" };
+    let file = format!("{}/../../{folder}/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let settings: Vec<Override> = settings.iter().map(|one| one.parse().unwrap()).collect();
     Scene::load(Some(file.as_ref()), &settings)
 }
