@@ -28,7 +28,7 @@ pub(crate) use level::{LONGEST_SETTLING, is_off_target};
 pub(crate) use resonance_fit::ResonanceFit;
 pub use response::Tone;
 pub(crate) use response::{
-    Line, classify, drive_harmonics, foreign_tone, regime_by_response, regime_on_the_way, subharmonic, without_tones,
+    Line, classify, drive_harmonics, foreign_tone, regime_by_response, regime_of_leg, subharmonic, without_tones,
 };
 pub use vines_model::regime::{Impact, Regime};
 

@@ -19,7 +19,7 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, SearchFound, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, Unsteady, is_another, regime_by_response,
-    regime_on_the_way, without_tones,
+    regime_of_leg, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
 use vines_scene::knowledge::Knowledge;
@@ -167,7 +167,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
                 let passes = (before.drive - self.requested) * (next - self.requested) <= 0.0;
                 let rises = (leg.drive - before.drive) * (leg.response - before.response) > 0.0;
                 if self.is_symmetric(leg.regime) && passes && (rises || is_last) {
-                    if self.secant([before, leg], step.abs() / steepness)? {
+                    if self.secant([before, leg], step.abs())? {
                         return Ok(());
                     }
                     leg = self.leg(0.0, FOLLOWED, 0.0)?;
@@ -251,6 +251,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             });
             near = if closed && is_near { near + 1 } else { 0 };
         }
+        if std::env::var("DBG").is_ok() { eprintln!("LIN {:?} ringing {} rings {:?} eps {} t={}", self.knowledge.linear, self.knowledge.ringing, self.knowledge.rings, self.knowledge.numbers.epsilon, self.run.periods); }
         self.leg(0.0, FOLLOWED, 0.0)
     }
 
@@ -263,15 +264,24 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         }
     }
 
+    /// Whether the motion is the one that is wanted, on the way and at rest, at its setpoint.
+    fn is_symmetric_at_rest(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
+        // The loops come to rest first.
+        if self.is_symmetric(leg.regime) {
+            *leg = self.leg(0.0, FOLLOWED, 0.0)?;
+        }
+        if self.is_symmetric(leg.regime) {
+            *leg = self.measure(FOLLOWED, true)?;
+        }
+        Ok(self.is_symmetric(leg.regime) && (leg.last / self.setpoint - 1.0).abs() < LEG_CHANGE)
+    }
+
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
     fn symmetric(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         while !(has_impacts(leg.regime) && leg.response > (1.0 - DRAWING) * self.b) {
-            if self.is_symmetric(leg.regime) {
-                // A rise may resemble impacts; at rest the setpoint tells them apart.
-                leg = self.leg(0.0, FOLLOWED, 0.0)?;
-                if self.is_symmetric(leg.regime) {
-                    return Ok(leg);
-                }
+            // A rise may resemble impacts; at rest the setpoint tells them apart.
+            if self.is_symmetric_at_rest(&mut leg)? {
+                return Ok(leg);
             }
             let spare = self.largest(leg.response) - leg.drive;
             if leg.response > RESPONSES[0] * self.b || spare < DRAWING * leg.drive {
@@ -287,7 +297,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// beside a carried particle, their evidence grows as the response falls.
     fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let mut seen = has_impacts(leg.regime);
-        while !(self.is_symmetric(leg.regime) || seen && leg.regime == Regime::NoImpacts)
+        while !(self.is_symmetric_at_rest(&mut leg)? || seen && leg.regime == Regime::NoImpacts)
             && self.setpoint > (RESPONSES[1] * self.b).max(FOLLOWS * leg.last)
         {
             leg = self.sweep(&leg, step)?;
@@ -318,6 +328,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             let Level { estimate, cycles } = self.hold(to, &criterion)?;
             // A level need not show impacts: the legs have.
             let regime = self.regime(&estimate, &cycles);
+            if std::env::var("DBG").is_ok() { eprintln!("SEC t={:.0} n={} of {} to={:.5} A={:.5} G={:.6}±{:.1e} ph={:.1e}±{:.1e} {:?} {:?} slope {:.3}", self.run.periods, estimate.periods, cycles.len(), to/self.b, estimate.response.value/self.b, self.knowledge.numbers.excitation(estimate.at[0].value),self.knowledge.numbers.excitation(estimate.at[0].uncertainty), estimate.phase_error.value, estimate.phase_error.uncertainty, regime, estimate.unsteady, slope*self.b/self.requested); }
             if !(self.is_symmetric(regime) || regime == Regime::NotEstablished) {
                 return Ok(false);
             }
@@ -333,9 +344,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
                     _ => Ok(true),
                 };
             }
-            // Between near levels, noise can be larger than what changes.
-            if (next[1] - at[1]).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
-                slope = (next[1] - at[1]) / (next[0] - at[0]);
+            // Noise hides what changes between near levels, but not that the slope predicts another change.
+            let [far, changed] = [next[0] - at[0], next[1] - at[1]];
+            if (changed - slope * far).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
+                slope = changed / far;
             }
             at = next;
         }
@@ -513,11 +525,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         };
         self.run.hold_response(to)?;
         self.setpoint = to.response;
-        self.measure(periods)
+        self.measure(periods, false)
     }
 
     /// Measures over `periods`, without foreign tones, which disturb so few periods.
-    fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
+    fn measure(&mut self, periods: usize, is_at_rest: bool) -> Result<Leg, ExperimentError> {
         let mut begins = Vec::new();
         while begins.len() < periods.max(ResonanceFit::FEWEST) {
             begins.push(self.run.period(self.stage)?);
@@ -536,7 +548,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             })
             .collect();
         let Some(fit) = ResonanceFit::of(&cycles, self.knowledge) else {
-            return self.measure(periods);
+            return self.measure(periods, is_at_rest);
         };
         let [drive, omega] = fit.at(0.0);
         let leg = Leg {
@@ -544,8 +556,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             last: cycles[cycles.len() - 1].amplitude(),
             drive: drive.value,
             omega: omega.value,
-            regime: regime_on_the_way(samples, self.knowledge, [fit.response, drive, omega]),
+            regime: regime_of_leg(samples, self.knowledge, [fit.response, drive, omega], is_at_rest),
         };
+        if std::env::var("DBG").is_ok() { eprintln!("LEG t={:.0} n={periods} set={:.5} A={:.5} last={:.5} G={:.4} om={:.3} {:?}", self.run.periods, self.setpoint/self.b, leg.response/self.b, leg.last/self.b, self.knowledge.numbers.excitation(leg.drive), leg.omega, leg.regime); let t = crate::identification::classify(&raw, self.knowledge.sample_time, leg.omega); eprintln!("    true {:.3} {:?} scatter {:?}", t.0, t.1, fit.unsteady()); }
         self.note(&leg);
         Ok(leg)
     }

@@ -270,13 +270,14 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
     }
 }
 
-/// [`regime_by_response`] of a motion that a loop moves: what its harmonics do not describe is the way, and not irregular.
-/// It serves the choice of the next move, for which the linear response counts as known. `at`: mean response, m, base, m, and frequency, rad/s.
-pub(crate) fn regime_on_the_way(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3]) -> Regime {
-    let content = Content::of(samples, knowledge, at[2].value, 0, ALL_HARMONICS);
-    content.map_or(Regime::Unknown, |content| {
-        regime_of(&content, samples, knowledge, at, true)
-    })
+/// [`regime_by_response`] of a few periods under the control of a loop, for the choice of the next move: the linear response counts as known. While the
+/// setpoint moves, what the harmonics do not describe is the way, and not irregular. `at`: mean response, m, base, m, and frequency, rad/s.
+pub(crate) fn regime_of_leg(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3], is_at_rest: bool) -> Regime {
+    match Content::of(samples, knowledge, at[2].value, 0, ALL_HARMONICS) {
+        None => Regime::Unknown,
+        Some(content) if is_at_rest && content.is_irregular() => Regime::Other,
+        Some(content) => regime_of(&content, samples, knowledge, at, true),
+    }
 }
 
 fn regime_of(
