@@ -135,6 +135,9 @@ impl SearchFound {
         let [low, high] = self.tried.map(|c| short(c * b));
         let tried = format!("at responses from {low} to {high} m ");
         match (self.held, self.impacts) {
+            (None, _) if self.late => {
+                tried + "no motion was steady and nonlinear yet. Allow more time (phase_lock.acquire_timeout)"
+            }
             (None, false) => {
                 tried
                     + "the motion stayed near the linear response. Allow a larger drive (phase_lock.amplitude_max), or track it with `vines backbone`"

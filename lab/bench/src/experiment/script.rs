@@ -19,7 +19,7 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, SearchFound, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, Unsteady, is_another, regime_by_response,
-    regime_of_leg, without_tones,
+    regime_of_leg, subharmonic, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
 use vines_scene::knowledge::Knowledge;
@@ -46,10 +46,6 @@ const STEEPEST: f64 = 10.0;
 const FOLLOWS: f64 = 0.8;
 /// Additional periods before the first level is measured, because the legs disturb the particle.
 const FIRST_PERIODS: usize = 24;
-/// Levels that bring the drive of a lock to the requested one within its uncertainty, before any within the limits of a lock is taken: each reduces the
-/// error to the share by which the slope is wrong.
-const PRECISE_LEVELS: usize = 5;
-
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
 pub(crate) type Held = [f64; 3];
 
@@ -155,6 +151,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             let mut step = if leg.drive < self.requested { step } else { -step };
             let mut steepness = 1.0;
             while self.is_symmetric(leg.regime) && self.setpoint > RESPONSES[1] * self.b {
+                self.note_held([leg.response, leg.drive, leg.omega]);
                 let before = leg;
                 leg = self.sweep(&leg, step / steepness)?;
                 if !self.is_symmetric(leg.regime) {
@@ -264,23 +261,22 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         }
     }
 
-    /// Whether the motion is the one that is wanted, on the way and at rest, at its setpoint.
-    fn is_symmetric_at_rest(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
-        // The loops come to rest first.
-        if self.is_symmetric(leg.regime) {
+    /// Whether the motion is of this kind also at rest, at its setpoint. It takes twice as long as a leg to come to rest.
+    fn rests(&mut self, leg: &mut Leg, is_kind: impl Fn(&Self, Regime) -> bool) -> Result<bool, ExperimentError> {
+        if is_kind(self, leg.regime) {
             *leg = self.leg(0.0, FOLLOWED, 0.0)?;
         }
-        if self.is_symmetric(leg.regime) {
+        if is_kind(self, leg.regime) {
             *leg = self.measure(FOLLOWED, true)?;
         }
-        Ok(self.is_symmetric(leg.regime) && (leg.last / self.setpoint - 1.0).abs() < LEG_CHANGE)
+        Ok(is_kind(self, leg.regime) && (leg.last / self.setpoint - 1.0).abs() < LEG_CHANGE)
     }
 
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
     fn symmetric(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         while !(has_impacts(leg.regime) && leg.response > (1.0 - DRAWING) * self.b) {
             // A rise may resemble impacts; at rest the setpoint tells them apart.
-            if self.is_symmetric_at_rest(&mut leg)? {
+            if self.rests(&mut leg, Self::is_symmetric)? {
                 return Ok(leg);
             }
             let spare = self.largest(leg.response) - leg.drive;
@@ -297,7 +293,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// beside a carried particle, their evidence grows as the response falls.
     fn fall(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let mut seen = has_impacts(leg.regime);
-        while !(self.is_symmetric_at_rest(&mut leg)? || seen && leg.regime == Regime::NoImpacts)
+        let has_none = |_: &Self, regime| regime == Regime::NoImpacts;
+        while !(self.rests(&mut leg, Self::is_symmetric)? || seen && self.rests(&mut leg, has_none)?)
             && self.setpoint > (RESPONSES[1] * self.b).max(FOLLOWS * leg.last)
         {
             leg = self.sweep(&leg, step)?;
@@ -320,38 +317,54 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// target. Returns false if the motion is lost.
     fn secant(&mut self, [before, leg]: [Leg; 2], step: f64) -> Result<bool, ExperimentError> {
         let mut slope = (leg.drive - before.drive) / (leg.response - before.response);
-        let mut at = [leg.response, leg.drive];
+        let mut at = if std::env::var("VB").is_ok() { [before.response, before.drive] } else {[leg.response, leg.drive]};
         for count in 0.. {
             let largest = step * at[0];
-            let to = at[0] + ((self.requested - at[1]) / slope).clamp(-largest, largest);
+            let to = at[0] + if count == 0 && std::env::var("VA").is_ok() { 0.0 } else { ((self.requested - at[1]) / slope).clamp(-largest, largest) };
             let criterion = self.criterion();
             let Level { estimate, cycles } = self.hold(to, &criterion)?;
-            // A level need not show impacts: the legs have.
-            let regime = self.regime(&estimate, &cycles);
+            // As a leg at rest: over the longest time, a beat would be irregular, too.
+            let last = self.last(&cycles[cycles.len().saturating_sub(FOLLOWED)..]);
+            let regime = regime_of_leg(last, self.knowledge, [estimate.response, estimate.at[0], estimate.at[1]], true);
             if std::env::var("DBG").is_ok() { eprintln!("SEC t={:.0} n={} of {} to={:.5} A={:.5} G={:.6}±{:.1e} ph={:.1e}±{:.1e} {:?} {:?} slope {:.3}", self.run.periods, estimate.periods, cycles.len(), to/self.b, estimate.response.value/self.b, self.knowledge.numbers.excitation(estimate.at[0].value),self.knowledge.numbers.excitation(estimate.at[0].uncertainty), estimate.phase_error.value, estimate.phase_error.uncertainty, regime, estimate.unsteady, slope*self.b/self.requested); }
+            // A level need not show impacts: the legs have.
             if !(self.is_symmetric(regime) || regime == Regime::NotEstablished) {
                 return Ok(false);
             }
             let next = [estimate.response.value, estimate.at[0].value];
+            self.note_held([next[0], next[1], estimate.at[1].value]);
             let is_within = !is_another(next[1] - self.requested, estimate.at[0].uncertainty, self.requested);
-            let is_close = self.is_near(&estimate, self.requested) || is_within && count >= PRECISE_LEVELS;
-            if is_close && self.is_in_phase(&estimate) {
-                return match estimate.unsteady {
-                    Some(why @ Unsteady::Scatter(_)) if !criterion.is_met(&estimate) => {
-                        let response = self.knowledge.target.units.response.quantity(estimate.response.value);
-                        Err(ExperimentError::NotSteady { periods: cycles.len(), response, why })
-                    }
-                    _ => Ok(true),
-                };
+            // No nearer than half of the distance before: noise is what is left.
+            let is_stuck = count > 0 && (next[1] - self.requested).abs() > 0.5 * (at[1] - self.requested).abs();
+            let not_steady = estimate.unsteady.filter(|_| !criterion.is_met(&estimate));
+            let not_steady = not_steady.filter(|why| matches!(why, Unsteady::Scatter(_)));
+            if self.is_in_phase(&estimate) && (is_within && is_stuck || self.is_near(&estimate, self.requested)) {
+                match not_steady {
+                    None => return Ok(true),
+                    Some(why) if is_stuck => return Err(self.not_steady(why, &estimate, &cycles)),
+                    // What disturbs a motion may still decay.
+                    Some(_) => {}
+                }
             }
-            // Noise hides what changes between near levels, but not that the slope predicts another change.
+            // Noise hides what changes between near levels, but not that the slope predicts another change. Legs are no levels.
             let [far, changed] = [next[0] - at[0], next[1] - at[1]];
-            if (changed - slope * far).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
+            if count > 0 && (changed - slope * far).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
                 slope = changed / far;
             }
             at = next;
         }
         Ok(false)
+    }
+
+    /// The motion at a level is not steady after the longest time.
+    fn not_steady(&self, why: Unsteady, estimate: &LevelEstimate, cycles: &[Cycle]) -> ExperimentError {
+        let samples = self.averaged(estimate, cycles);
+        let repeats = subharmonic(samples, self.knowledge, estimate.at[1].value).map(Unsteady::Repeats);
+        ExperimentError::NotSteady {
+            periods: cycles.len(),
+            response: self.knowledge.target.units.response.quantity(estimate.response.value),
+            why: repeats.unwrap_or(why),
+        }
     }
 
     /// Whether the drive that holds the response is `drive`, m, as far as its uncertainty and the resolution of a point show.
@@ -427,8 +440,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
 
     /// The samples of these periods, the last that were taken.
     pub fn averaged(&self, estimate: &LevelEstimate, cycles: &[Cycle]) -> &[Sample] {
-        let of_estimate = &cycles[cycles.len() - estimate.periods..];
-        let count = of_estimate.iter().map(|cycle| cycle.samples).sum::<usize>();
+        self.last(&cycles[cycles.len() - estimate.periods..])
+    }
+
+    /// The samples of the last cycles.
+    fn last(&self, cycles: &[Cycle]) -> &[Sample] {
+        let count = cycles.iter().map(|cycle| cycle.samples).sum::<usize>();
         &self.run.samples[self.run.samples.len() - count..]
     }
 
@@ -569,16 +586,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         self.levels.clear();
         self.tried = range(self.tried, [leg.response]);
         self.impacts |= has_impacts(leg.regime);
-        if !self.is_symmetric(leg.regime) {
-            return;
-        }
-        self.drives = range(self.drives, [leg.drive]);
+    }
+
+    /// Notes where the motion is the one that is wanted.
+    fn note_held(&mut self, held: Held) {
+        self.drives = range(self.drives, [held[1]]);
         let distance = |held: &Held| (held[1] - self.requested).abs();
         if self
             .nearest
-            .is_none_or(|nearest| distance(&self.moving) < distance(&nearest))
+            .is_none_or(|nearest| distance(&held) < distance(&nearest))
         {
-            self.nearest = Some(self.moving);
+            self.nearest = Some(held);
         }
     }
 

@@ -44,6 +44,8 @@ pub enum Unsteady {
     Scatter(Option<f64>),
     /// Correlation of the residuals of neighbouring periods, over what noise would have.
     Drift(f64),
+    /// Repeats only after this many periods.
+    Repeats(usize),
 }
 
 impl Display for Unsteady {
@@ -54,6 +56,7 @@ impl Display for Unsteady {
                 f,
                 "its periods scatter {times:.1} times as much as noise of the response explains: it is modulated or irregular, or noise of the drive moves it"
             ),
+            Self::Repeats(periods) => write!(f, "it repeats only after {periods} periods of the drive"),
             Self::Drift(times) => write!(
                 f,
                 "the residuals of its periods follow from each other, {times:.1} standard deviations of noise: it is modulated, or has not settled"

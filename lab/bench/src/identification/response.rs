@@ -63,6 +63,7 @@ struct Content {
     noise: f64,
     /// Foreign tones, which are not part of the residual.
     tones: Vec<Line>,
+    samples_per_period: usize,
 }
 
 impl Content {
@@ -79,7 +80,8 @@ impl Content {
                 .get(n - 2)
                 .map_or(0.0, |harmonic| harmonic / (n as f64).powi(order))
         };
-        let even = (2..self.harmonics.len() + 2).step_by(2);
+        // Of N samples per period, the odd harmonic N - k looks like k. Up to a third of N it has half of the velocity of those next to k at most.
+        let even = (2..self.harmonics.len().min(self.samples_per_period / 3) + 2).step_by(2);
         let significant = (SIGNIFICANT_HARMONIC.powi(2) + 2.0 * (even.len() as f64).ln()).sqrt();
         let neighbour = |n: usize| displacement(n + 1).max(if n > 2 { displacement(n - 1) } else { 0.0 });
         even.clone().any(|n| {
@@ -161,6 +163,7 @@ impl Content {
             rest: rms,
             noise: target.noise(rest.as_slice(), sample_time) / amplitude,
             tones: Vec::new(),
+            samples_per_period: (TAU / (omega * sample_time)) as usize,
         };
         Some((content, rest))
     }

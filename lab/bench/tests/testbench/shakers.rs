@@ -624,7 +624,8 @@ fn faults_of_a_shaker_end_the_drive_in_time_with_the_channel_that_contradicts() 
     let cases = [
         (0, "", &all[..], &[HELD][..], 0.3),
         // Little of the force is left.
-        (1, "", &[Base(Reversed), amplifier, stinger], &[60.0], 0.3),
+        (1, "", &[Base(Reversed), amplifier], &[60.0], 0.3),
+        (1, "", &[stinger], &[30.0, 60.0, 90.0], 0.32),
         (1, "", &[Base(Saturated)], &[120.0, HELD], 0.3),
         (0, no_limit, &[amplifier, third], &[20.0, 90.0, 250.0], 0.3),
         (0, strong, &[amplifier, third], &[20.0, 90.0, 250.0], 0.5),

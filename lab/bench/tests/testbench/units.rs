@@ -205,14 +205,14 @@ fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
         panic!("{error}")
     };
     assert!(
-        words.contains(&format!("C = 0.214 to {:.3} ", tried / b)),
+        words.contains(&format!("C = 0.151 to {:.3} ", tried / b)),
         "{error} {words}"
     );
-    let (error, _) = ended(&frame(&["phase_lock.acquire_timeout=35"]), true, by_search);
+    let (error, _) = ended(&frame(&["phase_lock.acquire_timeout=125"]), true, by_search);
     let [(tried, "m"), (nearest, "m")] = with_units(&error)[..] else {
         panic!("{error}")
     };
-    assert!(nearest < tried && is_near(nearest, 0.85 * b), "{error}");
+    assert!(is_near(nearest, 0.85 * b) && nearest / tried < 1.2, "{error}");
     let (scene, log) = (
         frame(&["controller.phase_target=-80", "start.dq2=0"]),
         RefCell::default(),
