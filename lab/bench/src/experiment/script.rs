@@ -248,7 +248,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             });
             near = if closed && is_near { near + 1 } else { 0 };
         }
-        if std::env::var("DBG").is_ok() { eprintln!("LIN {:?} ringing {} rings {:?} eps {} t={}", self.knowledge.linear, self.knowledge.ringing, self.knowledge.rings, self.knowledge.numbers.epsilon, self.run.periods); }
         self.leg(0.0, FOLLOWED, 0.0)
     }
 
@@ -269,7 +268,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         if is_kind(self, leg.regime) {
             *leg = self.measure(FOLLOWED, true)?;
         }
-        Ok(is_kind(self, leg.regime) && (leg.last / self.setpoint - 1.0).abs() < LEG_CHANGE)
+        let is_there = (leg.last / self.setpoint - 1.0).abs() < LEG_CHANGE;
+        self.impacts |= is_there && has_impacts(leg.regime);
+        Ok(is_there && is_kind(self, leg.regime))
     }
 
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
@@ -317,16 +318,20 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// target. Returns false if the motion is lost.
     fn secant(&mut self, [before, leg]: [Leg; 2], step: f64) -> Result<bool, ExperimentError> {
         let mut slope = (leg.drive - before.drive) / (leg.response - before.response);
-        let mut at = if std::env::var("VB").is_ok() { [before.response, before.drive] } else {[leg.response, leg.drive]};
+        let mut at = [leg.response, leg.drive];
         for count in 0.. {
             let largest = step * at[0];
-            let to = at[0] + if count == 0 && std::env::var("VA").is_ok() { 0.0 } else { ((self.requested - at[1]) / slope).clamp(-largest, largest) };
+            let to = at[0] + ((self.requested - at[1]) / slope).clamp(-largest, largest);
             let criterion = self.criterion();
             let Level { estimate, cycles } = self.hold(to, &criterion)?;
             // As a leg at rest: over the longest time, a beat would be irregular, too.
             let last = self.last(&cycles[cycles.len().saturating_sub(FOLLOWED)..]);
-            let regime = regime_of_leg(last, self.knowledge, [estimate.response, estimate.at[0], estimate.at[1]], true);
-            if std::env::var("DBG").is_ok() { eprintln!("SEC t={:.0} n={} of {} to={:.5} A={:.5} G={:.6}±{:.1e} ph={:.1e}±{:.1e} {:?} {:?} slope {:.3}", self.run.periods, estimate.periods, cycles.len(), to/self.b, estimate.response.value/self.b, self.knowledge.numbers.excitation(estimate.at[0].value),self.knowledge.numbers.excitation(estimate.at[0].uncertainty), estimate.phase_error.value, estimate.phase_error.uncertainty, regime, estimate.unsteady, slope*self.b/self.requested); }
+            let regime = regime_of_leg(
+                last,
+                self.knowledge,
+                [estimate.response, estimate.at[0], estimate.at[1]],
+                true,
+            );
             // A level need not show impacts: the legs have.
             if !(self.is_symmetric(regime) || regime == Regime::NotEstablished) {
                 return Ok(false);
@@ -575,27 +580,24 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             omega: omega.value,
             regime: regime_of_leg(samples, self.knowledge, [fit.response, drive, omega], is_at_rest),
         };
-        if std::env::var("DBG").is_ok() { eprintln!("LEG t={:.0} n={periods} set={:.5} A={:.5} last={:.5} G={:.4} om={:.3} {:?}", self.run.periods, self.setpoint/self.b, leg.response/self.b, leg.last/self.b, self.knowledge.numbers.excitation(leg.drive), leg.omega, leg.regime); let t = crate::identification::classify(&raw, self.knowledge.sample_time, leg.omega); eprintln!("    true {:.3} {:?} scatter {:?}", t.0, t.1, fit.unsteady()); }
-        self.note(&leg);
+        self.note(&leg, fit.unsteady().is_none());
         Ok(leg)
     }
 
     /// Notes a leg, for the next move and for the words of a search without a result.
-    fn note(&mut self, leg: &Leg) {
+    fn note(&mut self, leg: &Leg, is_explained: bool) {
         self.moving = [leg.response, leg.drive, leg.omega];
         self.levels.clear();
         self.tried = range(self.tried, [leg.response]);
-        self.impacts |= has_impacts(leg.regime);
+        // What noise does not explain may resemble impacts.
+        self.impacts |= is_explained && has_impacts(leg.regime);
     }
 
     /// Notes where the motion is the one that is wanted.
     fn note_held(&mut self, held: Held) {
         self.drives = range(self.drives, [held[1]]);
         let distance = |held: &Held| (held[1] - self.requested).abs();
-        if self
-            .nearest
-            .is_none_or(|nearest| distance(&held) < distance(&nearest))
-        {
+        if self.nearest.is_none_or(|nearest| distance(&held) < distance(&nearest)) {
             self.nearest = Some(held);
         }
     }

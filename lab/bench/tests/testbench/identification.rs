@@ -62,7 +62,10 @@ fn off(found: &Comparison) -> [f64; 2] {
     let exact = found.curve.distance(at.c, at.sigma, at.g).unwrap();
     let [sigma, g] = [exact.sigma, exact.g].map(Option::unwrap);
     assert!((at.g / 1.1 - 1.0).abs() < 0.01, "{at:?}");
-    println!("after {periods:.0} periods: sigma off by {sigma:.1e}; G {:.5}, off by {g:.1e}", at.g);
+    println!(
+        "after {periods:.0} periods: sigma off by {sigma:.1e}; G {:.5}, off by {g:.1e}",
+        at.g
+    );
     [sigma, g].map(f64::abs)
 }
 

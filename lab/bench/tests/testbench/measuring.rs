@@ -554,7 +554,8 @@ fn difficult_rigs_lock_from_rest_on_their_symmetric_motion() {
         assert!((lock.at.c - c).abs() < 2e-3, "{lock:?}");
     }
     // Beside its fold a modulation decays over 540 periods, and a level waits for 150.
-    let modulated = "[plant]\nepsilon = 0.046079366\nlambda = 0.68301824\nr = 0.27802309\n[excitation]\nG = 0.89886111\n";
+    let modulated =
+        "[plant]\nepsilon = 0.046079366\nlambda = 0.68301824\nr = 0.27802309\n[excitation]\nG = 0.89886111\n";
     let scene = common::scene(modulated, &[""; 0]).unwrap();
     let refused = record(&mut *Simulated::of(&scene).unwrap(), &scene).map(|_| ());
     assert!(
