@@ -7,8 +7,8 @@ import re
 import sys
 from pathlib import Path
 
-# Functions such as exp are those of the system, and differ in the last bit. Of a difference of results, such as sigma_less_exact, which is
-# 1e-6 of them, five digits stay.
+# Functions such as exp are those of the system, and differ in the last bit. A difference of results, such as
+# sigma_less_exact, is 1e-6 of them and keeps five digits.
 MOST = 1e-5
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
