@@ -118,19 +118,12 @@ mingw() {
     command -v "$name-posix" || command -v "$name" || true
 }
 
-# build_platform PLATFORM FOLDER [options of cargo build]: the packages of the options, stripped and the same bytes wherever
-# they are built, in FOLDER/TRIPLE/release (or another profile, in `profile`;
-# or another command of cargo than build, in `verb`).
-build_platform() (
-    platform=$1 folder=$2
-    triple=${TRIPLES[$platform]}
-    kind=$(toolchain "$platform")
-    with=$(linker "$platform")
-    shift 2
-    options=(--profile "${profile:-release}" --locked --target-dir "$folder" "$@")
-    [ -t 2 ] || options+=(--quiet)
+# platform_setup PLATFORM: what cargo needs to build for it so that the bytes are the same wherever and whenever they are built: exported
+# variables, and the variables triple, verb (a command of cargo, if not set) and unstable (options). Call it in a subshell.
+platform_setup() {
+    triple=${TRIPLES[$1]} kind=$(toolchain "$1") with=$(linker "$1") unstable=()
     # What a library says of paths would be another on every machine.
-    flags=(-Cstrip=symbols "--remap-path-prefix=$PWD=." "--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo")
+    local flags=(-Cstrip=symbols "--remap-path-prefix=$PWD=." "--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo") variable
     case $kind in
         debian)
             unpack_rust_web
@@ -142,10 +135,10 @@ build_platform() (
             case $triple in
                 # Without the texts of panics, which a page cannot show.
                 wasm32-*)
-                    options+=(-Z build-std=std,panic_abort -Z build-std-features=optimize_for_size -Z panic-immediate-abort)
-                    options+=(--config 'profile.live.panic="immediate-abort"')
+                    unstable+=(-Z build-std=std,panic_abort -Z build-std-features=optimize_for_size -Z panic-immediate-abort)
+                    unstable+=(--config 'profile.live.panic="immediate-abort"')
                     ;;
-                *) options+=(-Z build-std=std,panic_unwind) ;;
+                *) unstable+=(-Z build-std=std,panic_unwind) ;;
             esac
             ;;
     esac
@@ -165,16 +158,36 @@ build_platform() (
             export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$(rustc --print sysroot)/lib/rustlib/$(host_triple)/bin/rust-lld"
             ;;
         zig)
-            portable_environment || { cat .venv-portable.log >&2; fail "cargo-zigbuild, which links for $platform, could not be installed"; }
+            portable_environment || { cat .venv-portable.log >&2; fail "cargo-zigbuild, which links for $1, could not be installed"; }
             verb=zigbuild
             case $triple in *-linux-gnu) triple=$triple.$GLIBC ;; esac
             ;;
     esac
     CARGO_ENCODED_RUSTFLAGS=$(IFS=$'\x1f'; printf '%s' "${flags[*]}")
-    # Without increments: the same bytes wherever and whenever they are built.
+    # Without increments, which depend on what was built before.
     export CARGO_ENCODED_RUSTFLAGS CARGO_INCREMENTAL=0
-    say "Building for $platform ($kind toolchain, $with linker) ..."
-    cargo "$verb" "${options[@]}" --target "$triple" || fail "cargo could not build for $platform"
+    say "Building for $1 ($kind toolchain, $with linker) ..."
+}
+
+# build_platform PLATFORM FOLDER [options of cargo build]: the packages of the options, stripped, in FOLDER/TRIPLE/release (or another profile,
+# in `profile`; or another command of cargo than build, in `verb`).
+build_platform() (
+    platform_setup "$1"
+    options=(--profile "${profile:-release}" --locked --target-dir "$2" --target "$triple")
+    [ -t 2 ] || options+=(--quiet)
+    cargo "$verb" "${options[@]}" "${unstable[@]}" "${@:3}" || fail "cargo could not build for $1"
+)
+
+# platform_wheel PLATFORM FMUS FOLDER: the wheel, in FOLDER, with the FMUs of the folder FMUS; both absolute.
+platform_wheel() (
+    portable_environment || { cat .venv-portable.log >&2; fail "maturin, which builds the wheel, could not be installed"; }
+    platform_setup "$1"
+    mkdir -p python/vines/fmu
+    cp "$2"/{LoViNes,PhaseLock}.fmu python/vines/fmu
+    options=(--release --locked --target "${TRIPLES[$1]}" --target-dir "$target/platforms" --out "$3" --quiet)
+    [ "$with" != zig ] || options+=(--zig --compatibility manylinux2014)
+    cd python
+    maturin build "${options[@]}" "${unstable[@]}" || fail "maturin could not build the wheel for $1"
 )
 
 # pack_options PLATFORM ...: builds the libraries of the FMUs, and prints the options with which `vines pack` takes them, one on a line.

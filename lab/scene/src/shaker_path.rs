@@ -111,10 +111,10 @@ const REACH: i32 = 70;
 /// Number of times that such an interval is halved at most.
 const MOST_HALVINGS: u32 = 12;
 
-/// Phase by which a function turns between two points, rad.
+/// Phase by which a function turns between two points, rad; not a number where the function is not, as for a structure without damping.
 fn turned(of: &impl Fn(f64) -> Complex64, [begin, end]: [f64; 2], finest: u32) -> f64 {
     let turn = (of(end) / of(begin)).arg();
-    if finest == 0 || turn.abs() < 0.5 {
+    if finest == 0 || turn.is_nan() || turn.abs() < 0.5 {
         return turn;
     }
     let middle = 0.5 * (begin + end);

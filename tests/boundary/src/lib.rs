@@ -12,6 +12,7 @@ pub mod pair;
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
 
@@ -89,7 +90,7 @@ impl Fmu {
     fn load(model: usize, path: &Path) -> Self {
         let (name, description) = (MODELS[model][0], DESCRIPTIONS[model]);
         // SAFETY: it is ours, and loading it runs no code of its own. It stays loaded, since nobody drops it.
-        let functions = unsafe { Library::new(path).and_then(|library| Functions::load(Box::leak(Box::new(library)))) };
+        let functions = unsafe { Library::new(path).and_then(|library| Functions::load(&ManuallyDrop::new(library))) };
         let functions = functions.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         Self { name, functions, description }
     }
