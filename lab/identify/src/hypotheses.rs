@@ -23,7 +23,7 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 use crate::branch::Branch;
 use crate::hypothesis::{Hypothesis, STRENGTHS, impact_speed, plant};
 use crate::ideal_rig::IdealRig;
-use crate::motions::{AMPLITUDES, Goal, Motions, Place, backbone, uncertainties};
+use crate::motions::{AMPLITUDES, Goal, MOTION_STEP, Motions, Place, backbone, uncertainties};
 use crate::points::MeasuredPoint;
 use crate::quantity::{Known, Quantity, STEP, UNKNOWNS, Unknowns, gradient, moved, unknowns};
 
@@ -69,8 +69,6 @@ const WIDTHS: usize = 8;
 const THEORY: f64 = 0.04;
 /// Gain of a further step, relative to one and chi-square, at which a minimum counts as found: of a curve in closed form, and of one of motions.
 const LEAST_GAIN: [f64; 2] = [1e-9, 1e-4];
-/// Step of a difference of motions, which Newton's method finds to 1e-12.
-const MOTION_STEP: f64 = 1e-5;
 /// Amplitudes that count as equal to one of a record, relative.
 const ASIDE: f64 = 0.03;
 
