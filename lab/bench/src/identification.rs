@@ -191,7 +191,7 @@ pub struct Lock {
     pub unseen_growth: f64,
     /// From the start to the settled lock, in periods of the locked motion.
     pub periods_to_lock: f64,
-    /// Whether control holds the response, because a constant drive would hold it hardly, or not.
+    /// Whether control holds the response; if not, a constant drive.
     pub held: bool,
     /// Impacts per period; NaN if the rig does not report them.
     pub impacts_per_period: f64,

@@ -83,7 +83,7 @@ pub struct Record {
     pub samples: Vec<Sample>,
     /// Index of the sample at which the lock had settled.
     pub settled: usize,
-    /// Whether the response is held by control, because the requested drive alone would hold it hardly, or not.
+    /// Whether the response is held by control; if not, by the requested drive, because the controller does not control the response.
     pub held: bool,
     /// Index of the sample at which the controller was asked to release the drive.
     pub hold_end: usize,

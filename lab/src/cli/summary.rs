@@ -168,7 +168,7 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
         format!(
             "Locked after {:.0} periods{}: {motion}, phase error {:.1e} ± {:.1e} degrees\n",
             lock.periods_to_lock,
-            held(lock, scene),
+            under_drive(lock),
             at.phase_error_deg,
             at.u_phase_deg
         )
@@ -248,16 +248,12 @@ fn notes(result: &Comparison) -> Vec<String> {
     notes
 }
 
-/// That control holds the response, if it does.
-fn held(lock: &Lock, scene: &Scene) -> &'static str {
-    let structure = scene.structure.as_ref();
-    match lock.held {
-        // A constant command is no constant force.
-        true if structure.is_some_and(|structure| structure.shaker.is_some()) => {
-            " (the response is held by control, as always behind a shaker)"
-        }
-        true => " (the response is held by control: a constant drive holds it hardly, or not)",
-        false => "",
+/// That a constant drive holds the lock, if the controller does not control the response.
+fn under_drive(lock: &Lock) -> &'static str {
+    if lock.held {
+        ""
+    } else {
+        " (under a constant drive: the controller does not control the response)"
     }
 }
 
