@@ -252,7 +252,7 @@ pub fn client(&([epsilon, lambda, r], noise, scales): &Case, snr: &str) -> Resul
     let linear = LinearResponse {
         omega0: 1.0,
         damping_rate: 0.5 * epsilon * lambda,
-        ..LinearResponse::of(&scene.plant)
+        ..LinearResponse::of(&scene.plant, scene.definition().reference)
     };
     let plan = scene.plan_on(scene.knowledge().measured(linear));
     Ok((Parameters::dimensionless(epsilon, lambda, r), scene, plan))

@@ -48,7 +48,7 @@ fn main() -> Result<(), Failure> {
         .structure
         .as_ref()
         .is_some_and(|structure| structure.shaker.is_some());
-    let plan = scene.plan_on(scene.knowledge().measured(LinearResponse::of(&scene.plant)));
+    let plan = scene.plan_on(scene.knowledge().measured(scene.knowledge().linear));
     let healthy = |tracks| -> Result<[f64; 2], Failure> {
         let run = run(&mut SensorsOnly::around(Simulated::of(&scene)?), &plan, tracks);
         Ok(run?)

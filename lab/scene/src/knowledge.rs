@@ -182,7 +182,7 @@ pub struct Knowledge {
 impl Knowledge {
     /// A rig that is as its drawing says.
     pub fn of(plant: &Parameters, definition: Definition, amplitude: f64, sample_time: f64) -> Self {
-        let linear = LinearResponse::of(plant);
+        let linear = LinearResponse::of(plant, definition.reference);
         let target = Target {
             phase: definition.phase,
             measurands: definition.measurands(),

@@ -131,7 +131,7 @@ pub fn impacts_by_resonance(
 ) -> Impacts {
     // Damping and detuning of a linear response of this gain with this response over the base.
     let rate = linear.gain * base.value / Complex64::from_polar(response.value, target);
-    let stated = Complex64::new(linear.damping_rate, omega.value - linear.omega0);
+    let stated = linear.rate(omega.value);
     let added = Complex64::new(0.0, -2.0 / linear.omega0) * (rate - stated);
     let relative = [response, base]
         .map(|one| one.uncertainty / one.value)
@@ -193,17 +193,18 @@ pub struct LinearResponse {
 
 impl LinearResponse {
     /// That of a plant whose particle is free.
-    pub fn of(plant: &Parameters) -> Self {
+    pub fn of(plant: &Parameters, reference: Reference) -> Self {
         let omega0 = plant.natural_frequency();
-        Self {
+        let linear = Self {
             omega0,
             damping_rate: 0.5 * plant.damping / plant.primary_mass,
             uncertainty: 0.0,
-            gain: Complex64::new(0.0, -0.5 * omega0),
+            gain: Complex64::ZERO,
             u_gain: 0.0,
             particle: ParticleState::Free,
             shaker: None,
-        }
+        };
+        Self { gain: linear.oscillator_gain(omega0, reference), ..linear }
     }
 
     /// Natural frequency and damping ratio as data; both have the same uncertainty, the real and the imaginary part of one rate.

@@ -46,6 +46,7 @@ const STEEPEST: f64 = 10.0;
 const FOLLOWS: f64 = 0.8;
 /// Additional periods before the first level is measured, because the legs disturb the particle.
 const FIRST_PERIODS: usize = 24;
+
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
 pub(crate) type Held = [f64; 3];
 

@@ -457,7 +457,6 @@ pub(crate) fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64
 
 #[cfg(test)]
 mod tests {
-    use vines_scene::linear::LinearResponse;
     use vines_scene::scene::Scene;
 
     use super::*;
@@ -482,7 +481,8 @@ mod tests {
             let scene = Scene::load(None, &overrides).unwrap();
             let omega = scene.dimensionless().omega(6.0 * share(4) - 3.0);
             let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
-            let knowledge = scene.knowledge().measured(LinearResponse::of(&scene.plant));
+            let knowledge = scene.knowledge();
+            let knowledge = knowledge.measured(knowledge.linear);
             let step = scene.sample_time();
             let mut rig = Simulated::of(&scene).unwrap();
             let samples: Vec<Sample> = (0..6000)

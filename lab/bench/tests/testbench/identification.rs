@@ -5,7 +5,6 @@ use vines_bench::advice::{Reason, reason};
 use vines_bench::comparison::Comparison;
 use vines_bench::experiment::{self, ExperimentError};
 use vines_bench::identification::{DecayEnd, IdentificationError, Regime, identify};
-use vines_bench::linear::LinearResponse;
 use vines_bench::plan::Plan;
 use vines_bench::record::Sample;
 use vines_bench::rig::{BuiltIn, Controller, Fault, Rig, SensorsOnly, Simulated};
@@ -122,7 +121,7 @@ fn a_lock_of_the_linear_mode_or_of_an_asymmetric_motion_is_refused() {
     let rest = dimensionless("start.dq2=0");
     // Only the loop check knows the linear response of such a rig.
     let stated = rest.knowledge();
-    let checked = stated.measured(LinearResponse::of(&rest.plant));
+    let checked = stated.measured(rest.knowledge().linear);
     for (knowledge, expected) in [(stated, Regime::NotEstablished), (checked, Regime::NoImpacts)] {
         let mut rig = SensorsOnly::around(Simulated::of(&rest).unwrap());
         let found = identified_by(&mut rig, &mut constant_drive(&rest), &rest, &rest.plan_on(knowledge));

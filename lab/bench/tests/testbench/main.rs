@@ -17,7 +17,6 @@ use phase_lock::Config;
 use vines_bench::backbone::{Tracked, track};
 use vines_bench::experiment::{ExperimentError, run};
 use vines_bench::identification::{Identification, IdentificationError, identify};
-use vines_bench::linear::LinearResponse;
 use vines_bench::plan::Plan;
 use vines_bench::record::Record;
 use vines_bench::rig::{
@@ -65,7 +64,7 @@ fn says(result: Result<Scene, SceneError>, parts: &str) -> String {
 
 /// The experiment on a rig whose linear response is known as a loop check finds it.
 fn checked(scene: &Scene) -> Plan {
-    scene.plan_on(scene.knowledge().measured(LinearResponse::of(&scene.plant)))
+    scene.plan_on(scene.knowledge().measured(scene.knowledge().linear))
 }
 
 /// A rig whose readings, and whose drives with the time to the next sample, s, pass a function each.
