@@ -192,19 +192,22 @@ pub struct LinearResponse {
 }
 
 impl LinearResponse {
-    /// That of a plant whose particle is free.
+    /// That of a plant whose particle is free. A base moves the mass through spring and damper.
     pub fn of(plant: &Parameters, reference: Reference) -> Self {
-        let omega0 = plant.natural_frequency();
-        let linear = Self {
+        let (omega0, damping_rate) = (plant.natural_frequency(), 0.5 * plant.damping / plant.primary_mass);
+        let through_damper = match reference {
+            Reference::Base => 2.0 * damping_rate / omega0,
+            Reference::Force => 0.0,
+        };
+        Self {
             omega0,
-            damping_rate: 0.5 * plant.damping / plant.primary_mass,
+            damping_rate,
             uncertainty: 0.0,
-            gain: Complex64::ZERO,
+            gain: Complex64::new(0.0, -0.5 * omega0) * Complex64::new(1.0, through_damper),
             u_gain: 0.0,
             particle: ParticleState::Free,
             shaker: None,
-        };
-        Self { gain: linear.oscillator_gain(omega0, reference), ..linear }
+        }
     }
 
     /// Natural frequency and damping ratio as data; both have the same uncertainty, the real and the imaginary part of one rate.
