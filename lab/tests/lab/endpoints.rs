@@ -275,7 +275,7 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
             "--lock-step --silence 30",
             many,
             ("INT", 130),
-            60_000,
+            20_000,
             "points were measured before",
         ),
     ] {
