@@ -472,7 +472,7 @@ fn recording() -> Recording {
 /// That recording by sensors of q1 and the base that measure these quantities.
 fn recorded_as([response, base]: [Measurand; 2]) -> Recording {
     recorded(&format!(
-        " chain.snr=60 resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
+        " chain.snr=60 chain.seed=2 resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
         response.name(),
         base.name()
     ))
@@ -676,13 +676,21 @@ fn unequal_gaps_leave_the_points_as_they_are() {
 fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_to_do() {
     let scene = wrong_scene();
     let mut good = recording();
-    good.response.truncate(6000);
-    good.drive.truncate(6000);
+    // Levels, after the way to them.
+    for values in [&mut good.response, &mut good.drive] {
+        values.drain(..10_000);
+        values.truncate(6000);
+    }
     let each = |values: &mut Vec<f64>, of: fn(f64) -> f64| values.iter_mut().for_each(|value| *value = of(*value));
     /// What breaks a recording, and what its message contains.
     type Case<'a> = (&'a dyn Fn(&mut Recording), &'a [&'a str]);
     let clip = |one: &mut Recording| each(&mut one.response, |value| value.clamp(-5e-3, 5e-3));
     let reverse = |one: &mut Recording| each(&mut one.drive, |value| -value);
+    // Levels fall as a decay does. In reverse they rise.
+    let rest = |one: &mut Recording| {
+        one.drive.fill(0.0);
+        one.response.reverse();
+    };
     let cut = |one: &mut Recording| {
         one.response.truncate(500);
         one.drive.truncate(500);
@@ -694,7 +702,7 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
         ),
         (&|one| one.drive.truncate(5999), &["y has 6000 samples", "x has 5999"]),
         (&clip, &["channel y is clipped", "reduce the gain"]),
-        (&|one| one.drive.fill(0.0), &["base x rests", "connected"]),
+        (&rest, &["base x rests", "connected"]),
         (&|one| std::mem::swap(&mut one.response, &mut one.drive), &["swapped"]),
         (&reverse, &["wrong sign", "--drive x:-1"]),
         (&|one| one.sample_time *= 3.0, &["strongest oscillation", "--rate"]),
@@ -709,7 +717,7 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
             .and_then(|_| damaged.curve(&scene));
         let message = curve.unwrap_err().to_string();
         let is_complete = words.iter().all(|word| message.contains(word));
-        assert!(message.starts_with("record.csv") && is_complete, "{message}");
+        assert!(message.starts_with("record.csv") && is_complete, "{words:?}: {message}");
     }
 }
 
