@@ -120,7 +120,7 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
     --------
     >>> found = identify()
     >>> round(found.lock["sigma"], 4), found.lock["regime_by_impacts"]
-    (-1.1394, 'symmetric 1:1')
+    (-1.1396, 'symmetric 1:1')
     """
     if results not in ("all", "lock"):
         raise ValueError(f"results = {results!r}: 'all' and 'lock' are allowed")
