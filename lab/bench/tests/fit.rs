@@ -469,13 +469,17 @@ fn recording() -> Recording {
     recorded(" chain.snr=60")
 }
 
-/// That recording by sensors of q1 and the base that measure these quantities.
+/// The levels of that recording by sensors of q1 and the base that measure these quantities. While its response rises by a percent per period the model is not exact: with the way to the levels, 2 of 24 seeds are rejected.
 fn recorded_as([response, base]: [Measurand; 2]) -> Recording {
-    recorded(&format!(
-        " chain.snr=60 chain.seed=2 resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
+    let mut one = recorded(&format!(
+        " chain.snr=60 resonance.sensor=q1 resonance.sensor_quantity={} resonance.reference_quantity={}",
         response.name(),
         base.name()
-    ))
+    ));
+    for values in [&mut one.response, &mut one.drive] {
+        values.drain(..8000);
+    }
+    one
 }
 
 fn recorded(settings: &str) -> Recording {
