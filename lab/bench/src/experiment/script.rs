@@ -319,8 +319,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// target. Returns false if the motion is lost.
     fn secant(&mut self, [before, leg]: [Leg; 2], step: f64) -> Result<bool, ExperimentError> {
         let mut slope = (leg.drive - before.drive) / (leg.response - before.response);
-        let mut at = [leg.response, leg.drive];
-        for count in 0.. {
+        // A leg, and then levels.
+        let (mut at, mut is_level) = ([leg.response, leg.drive], false);
+        loop {
             let largest = step * at[0];
             let to = at[0] + ((self.requested - at[1]) / slope).clamp(-largest, largest);
             let criterion = self.criterion();
@@ -341,7 +342,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             self.note_held([next[0], next[1], estimate.at[1].value]);
             let is_within = !is_another(next[1] - self.requested, estimate.at[0].uncertainty, self.requested);
             // No nearer than half of the distance before: noise is what is left.
-            let is_stuck = count > 0 && (next[1] - self.requested).abs() > 0.5 * (at[1] - self.requested).abs();
+            let is_stuck = is_level && (next[1] - self.requested).abs() > 0.5 * (at[1] - self.requested).abs();
             let not_steady = estimate.unsteady.filter(|_| !criterion.is_met(&estimate));
             let not_steady = not_steady.filter(|why| matches!(why, Unsteady::Scatter(_)));
             if self.is_in_phase(&estimate) && (is_within && is_stuck || self.is_near(&estimate, self.requested)) {
@@ -352,14 +353,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
                     Some(_) => {}
                 }
             }
-            // Noise hides what changes between near levels, but not that the slope predicts another change. Legs are no levels.
+            // Noise hides what changes between near levels, but not that the slope predicts another change.
             let [far, changed] = [next[0] - at[0], next[1] - at[1]];
-            if count > 0 && (changed - slope * far).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
+            if is_level && (changed - slope * far).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
                 slope = changed / far;
             }
-            at = next;
+            (at, is_level) = (next, true);
         }
-        Ok(false)
     }
 
     /// The motion at a level is not steady after the longest time.
