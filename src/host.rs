@@ -23,6 +23,7 @@
 
 use core::fmt;
 
+use nalgebra::linalg::Schur;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use num_complex::Complex64;
@@ -1012,9 +1013,12 @@ impl Modal {
         if beside > 0 {
             balance_parlett_reinsch(&mut state);
         }
-        let found = state.complex_eigenvalues();
+        // The QR algorithm turns some matrices for ever; 30 steps for an eigenvalue are LAPACK's limit.
+        let steps = 30 * state.nrows();
+        let found = Schur::try_new(state, f64::EPSILON, steps).map(|schur| schur.complex_eigenvalues());
         let mut poles: Vec<_> = found
             .iter()
+            .flatten()
             .filter(|lambda| lambda.im >= 0.0)
             .map(|lambda| self.pole(*lambda, m))
             .collect();

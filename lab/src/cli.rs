@@ -24,6 +24,8 @@ mod theory;
 mod watch;
 
 use std::ffi::OsString;
+use std::fmt::Display;
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -90,13 +92,18 @@ enum Command {
     Man(shell::ManArguments),
 }
 
+/// Prints a line of a message. That nobody reads messages any longer ends nothing: not a signal's orderly end, which would panic with `eprintln`.
+fn say(line: impl Display) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
 /// Runs the command of the program's arguments, prints its results, and returns the exit code.
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::try_parse().unwrap_or_else(|error| shell::with_advice(error).exit());
     signals::start();
     if let Err(error) = output::keep_stdout() {
-        eprintln!("error: cannot keep stdout for the results: {error}");
+        say(format_args!("error: cannot keep stdout for the results: {error}"));
         return ExitCode::FAILURE;
     }
     let outcome = dispatch(cli.command).and_then(Results::show);
@@ -104,9 +111,9 @@ pub fn main() -> ExitCode {
     let code = match outcome {
         Ok(()) => 0,
         Err(failure) => {
-            eprintln!("error: {}", failure.message);
+            say(format_args!("error: {}", failure.message));
             if let Some(signal) = signal.filter(|_| failure.code != failure::INTERRUPTED) {
-                eprintln!("error: {}", signals::ended(signal));
+                say(format_args!("error: {}", signals::ended(signal)));
             }
             failure.code
         }

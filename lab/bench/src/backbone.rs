@@ -105,7 +105,7 @@ pub struct Tracked {
 }
 
 /// Where a backbone ends: at its fold, or where the motion changes otherwise.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub struct CurveEnd {
     /// The last response with the 1:1 motion, and the level without it.
     pub between: [Quantity; 2],
@@ -115,6 +115,8 @@ pub struct CurveEnd {
     pub regime: Regime,
     /// The rig does not report impacts: nothing is then said of a particle.
     pub is_silent: bool,
+    /// What ended tracking below the level: without the motion of the curve, response or drive may be too small for the controller.
+    pub after: Option<ExperimentError>,
 }
 
 impl Display for CurveEnd {
@@ -131,7 +133,10 @@ impl Display for CurveEnd {
                 "The backbone ends between {held:.4e} (C = {c:.4}) and {level:.4e} (C = {beyond:.4}): the motion there is {}",
                 self.regime
             ),
-        }
+        }?;
+        self.after
+            .as_ref()
+            .map_or(Ok(()), |error| write!(f, ". After that, {error}"))
     }
 }
 
@@ -144,6 +149,8 @@ struct Tracker<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     script: Script<'b, 'a, R, C>,
     plan: &'a Plan,
     points: Vec<LevelPoint>,
+    /// Where the motion of the curve ended.
+    end: Option<CurveEnd>,
 }
 
 /// Tracks the backbone.
@@ -169,17 +176,25 @@ pub fn track_into(
 ) -> Result<Tracked, ExperimentError> {
     let mut quiet = |_, _| {};
     let mut run = ControlLoop::new(rig, controller, plan, &plan.tracking, samples, &mut quiet)?;
-    let mut tracker = Tracker { script: Script::new(&mut run), plan, points: Vec::new() };
+    let mut tracker = Tracker {
+        script: Script::new(&mut run),
+        plan,
+        points: Vec::new(),
+        end: None,
+    };
     tracker.script.impacts()?;
     let periods_to_lock = tracker.script.run.periods;
     tracker.script.stage = Stage::Tracking;
     let followed = tracker.follow(progress);
-    let Tracker { points, .. } = tracker;
-    let (end, ended) = match followed {
+    let Tracker { points, end, .. } = tracker;
+    let (end, ended) = match (followed, end) {
         // What was measured is kept.
-        Err(error) if points.is_empty() => return Err(error),
-        Err(error) => (None, Some(error)),
-        Ok(end) => (end, None),
+        (Err(error), _) if points.is_empty() => return Err(error),
+        (Err(error @ ExperimentError::Tripped { .. }), Some(end)) => {
+            (Some(CurveEnd { after: Some(error), ..end }), None)
+        }
+        (Err(error), _) => (None, Some(error)),
+        (Ok(has_ended), end) => (end.filter(|_| has_ended), None),
     };
     Ok(Tracked {
         knowledge: plan.knowledge,
@@ -192,8 +207,8 @@ pub fn track_into(
 }
 
 impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
-    /// Goes through the levels. Returns where the curve ended before the last one.
-    fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<Option<CurveEnd>, ExperimentError> {
+    /// Goes through the levels. Returns whether the curve has ended.
+    fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<bool, ExperimentError> {
         let levels = &self.plan.levels;
         for (n, &level) in levels.iter().enumerate() {
             progress(n, levels.len());
@@ -207,22 +222,28 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
             }
             let point = self.hold(level)?;
             self.points.push(point);
-            let Some((held, Regime::Symmetric | Regime::Unresolved)) = before else {
-                continue;
-            };
-            // Only where impacts are reported does a motion without them mean that they have ended.
             let is_silent = point.regime_by_impacts.is_none();
-            if point.regime == Regime::Other || point.regime == Regime::NoImpacts && !is_silent {
-                let Knowledge { target, numbers, .. } = &self.plan.knowledge;
-                return Ok(Some(CurveEnd {
-                    between: [held, level].map(|metres| target.units.response.quantity(metres)),
-                    c: [held, level].map(|metres| metres / numbers.b),
-                    regime: point.regime,
-                    is_silent,
-                }));
+            match (before, point.regime) {
+                (_, Regime::Symmetric | Regime::Unresolved | Regime::Asymmetric) => self.end = None,
+                (Some((held, Regime::Symmetric | Regime::Unresolved)), regime) => {
+                    let Knowledge { target, numbers, .. } = &self.plan.knowledge;
+                    self.end = Some(CurveEnd {
+                        between: [held, level].map(|metres| target.units.response.quantity(metres)),
+                        c: [held, level].map(|metres| metres / numbers.b),
+                        regime,
+                        is_silent,
+                        after: None,
+                    });
+                }
+                _ => {}
+            }
+            // Only where impacts are reported does a motion without them mean that they have ended: a spring fades into the linear response.
+            let has_ended = point.regime == Regime::Other || point.regime == Regime::NoImpacts && !is_silent;
+            if has_ended && self.end.is_some() {
+                return Ok(true);
             }
         }
-        Ok(None)
+        Ok(false)
     }
 
     /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.

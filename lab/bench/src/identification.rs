@@ -22,7 +22,7 @@ use vines_scene::scene::{Measurand, Units};
 pub(crate) use asked::{Departure, is_another};
 pub(crate) use cycle::Cycle;
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
-pub(crate) use decay::{Harmonic, PER_PERIOD, base_at_rest, harmonic};
+pub(crate) use decay::{PER_PERIOD, base_at_rest, harmonic};
 pub(crate) use level::{Criterion, LevelEstimate, Unsteady};
 pub(crate) use level::{LONGEST_SETTLING, is_off_target};
 pub(crate) use resonance_fit::ResonanceFit;

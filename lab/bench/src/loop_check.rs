@@ -29,6 +29,8 @@ use vines_scene::scene::{Unit, Units};
 const SHARES: [f64; 2] = [0.01, 0.01 / 16.0];
 /// Factor by which the drive is raised at a time: a fault that noise has hidden is seen at little more.
 const RAISE: f64 = 4.0;
+/// Largest relative difference of the frequency of a mode from the expected one: the range of a controller.
+const RANGE: f64 = 0.1;
 /// Numbers of periods: without a drive, and with it.
 const CHECK_PERIODS: [usize; 2] = [2, 24];
 
@@ -238,7 +240,7 @@ impl Sine {
         let Self { target, omega, step } = self;
         let values = readings.iter().map(|reading| reading[channel]);
         let (start, known) = poles.split_last().unwrap_or((&Complex64::ZERO, &[]));
-        let found = Oscillations::new(values, [-origin * step, step], trend, known, *start);
+        let found = Oscillations::new(values, [-origin * step, step], trend, known, *start, RANGE);
         let displacement = target.displacement(channel - 1, omega);
         let unit = displacement * Complex64::cis(-readings[0][0] - origin * omega * step);
         let variance = found.variance(omega * step, self.period());

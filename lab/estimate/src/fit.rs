@@ -1,6 +1,6 @@
 //! Generalised least squares for the force, maximum likelihood for three variances.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 use num_complex::Complex64;
 
 use crate::columns::{Columns, Force};
@@ -279,7 +279,7 @@ impl Solution {
         let cross = all.view((n, 0), (rest, n)).into_owned();
         let matrix = all.view((0, 0), (n, n)) - cross.tr_mul(&inverse.solve(&cross));
         let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&right.rows(n, rest).into_owned()));
-        let eigen = matrix.symmetric_eigen();
+        let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, 30 * n)?;
         let largest = eigen.eigenvalues.max();
         let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > ROUNDING * largest).collect();
         let row = |i: &usize| eigen.eigenvectors.column(*i).transpose() * eigen.eigenvalues[*i].sqrt();

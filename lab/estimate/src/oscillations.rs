@@ -26,8 +26,6 @@ pub struct Oscillations {
 
 /// Largest number of steps of Gauss and Newton; they end where the samples are not explained better.
 const STEPS: usize = 12;
-/// Largest relative difference of the frequency of the unknown pole from the first value: the range of a controller.
-const RANGE: f64 = 0.1;
 
 /// Samples, of which the first is at `first` times `step`, s, and what is known of them.
 struct Samples<'a> {
@@ -81,13 +79,14 @@ impl Samples<'_> {
 
 impl Oscillations {
     /// Of samples `step` seconds apart, the first of which is at the time `first`, s, beside a trend of this degree. `start`: a first value of the
-    /// unknown pole, whose frequency is looked for in quarters of a turn over the record.
+    /// unknown pole, whose frequency is looked for within this `range`, relative, in quarters of a turn over the record.
     pub fn new(
         samples: impl IntoIterator<Item = f64>,
         [first, step]: [f64; 2],
         trend: usize,
         known: &[Complex64],
         start: Complex64,
+        range: f64,
     ) -> Self {
         let values = DVector::from_vec(samples.into_iter().collect());
         let times = (0..values.len()).map(|n| first + n as f64 * step).collect();
@@ -95,7 +94,7 @@ impl Oscillations {
         let quarter = FRAC_PI_2 / (samples.values.len() as f64 * step);
         let better = |one: Self, other: Self| if other.error() < one.error() { other } else { one };
         let turned = |n: i32| samples.at(start + Complex64::new(0.0, f64::from(n) * quarter));
-        let most = (RANGE * start.im / quarter) as i32;
+        let most = (range * start.im / quarter) as i32;
         let mut best = (-most..=most).map(turned).fold(turned(0), better);
         let columns = |best: &Self| samples.columns(best.pole, best.amplitudes.last().copied());
         for _ in 0..STEPS {
@@ -162,7 +161,7 @@ mod tests {
             0.3 - 0.01 * t + (amplitudes[0] * (drive * t).exp() + amplitudes[1] * (mode * t).exp()).im
         };
         let start = Complex64::new(-0.01, 0.95);
-        let found = Oscillations::new((50..2500).map(at), [50.0 * step, step], 1, &[drive], start);
+        let found = Oscillations::new((50..2500).map(at), [50.0 * step, step], 1, &[drive], start, 0.1);
         assert!((found.pole - mode).norm() < 1e-12, "{}", found.pole);
         let errors = found
             .amplitudes

@@ -5,7 +5,9 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, Dyn, RowSVector, SMatrix, SVector, linalg::QR};
+use nalgebra::{
+    Complex, Const, DMatrix, DVector, DimMin, Dyn, RowSVector, SMatrix, SVector, linalg::QR, linalg::Schur,
+};
 
 /// Standard errors from which on a difference is not noise: 0.3 % of normal noise is beyond.
 pub const SIGNIFICANT: f64 = 3.0;
@@ -98,11 +100,14 @@ where
     None
 }
 
-/// The smallest solution of `matrix x = right`.
+/// The smallest solution of `matrix x = right`; `None` if the matrix contains what is no number, in which singular values are searched for ever.
 fn solve<const N: usize>(matrix: SMatrix<f64, N, N>, right: &SVector<f64, N>) -> Option<SVector<f64, N>>
 where
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
 {
+    if !matrix.iter().all(|one| one.is_finite()) {
+        return None;
+    }
     let lu = matrix.lu();
     let pivots = lu.lu_internal().diagonal().abs();
     // The factors show a free direction as a pivot that is rounding.
@@ -114,6 +119,20 @@ where
     let least = factors.solve(&right, SINGULAR * factors.singular_values.max()).ok()?;
     Some(SVector::from_column_slice(least.as_slice()))
 }
+
+/// Eigenvalues of a square matrix; NaN if it contains one, or where the QR algorithm does not converge: some matrices it turns for ever.
+#[must_use]
+pub fn eigenvalues(matrix: DMatrix<f64>) -> Vec<Complex<f64>> {
+    let size = matrix.nrows();
+    let found = Schur::try_new(matrix, f64::EPSILON, QR_STEPS * size);
+    found.map_or_else(
+        || vec![Complex::new(f64::NAN, f64::NAN); size],
+        |schur| schur.complex_eigenvalues().as_slice().to_vec(),
+    )
+}
+
+/// Most steps of the QR algorithm for an eigenvalue, as in LAPACK's dhseqr; usual are two.
+const QR_STEPS: usize = 30;
 
 /// Pivots and singular values over the largest that are rounding.
 const SINGULAR: f64 = 1e-14;
@@ -683,6 +702,17 @@ impl Regression {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_matrix_without_eigenvalues_or_a_solution_ends_the_search_for_them() {
+        let nothing = DMatrix::from_element(4, 4, f64::NAN);
+        assert!(eigenvalues(nothing).iter().all(|one| one.re.is_nan()));
+        let mut one = DMatrix::identity(4, 4);
+        one[(2, 1)] = f64::INFINITY;
+        assert!(eigenvalues(one).iter().all(|one| one.re.is_nan()));
+        let matrix = SMatrix::<f64, 4, 4>::from_element(f64::NAN);
+        assert_eq!(solve(matrix, &SVector::from_element(1.0)), None);
+    }
 
     #[test]
     fn roots_of_a_quadratic_keep_their_digits_and_are_continuous_where_the_linear_coefficient_changes_sign() {

@@ -147,7 +147,7 @@ impl ExperimentArguments {
             return Ok(plan);
         }
         let checked = loop_check::check(rig, &plan).map_err(ExperimentError::from)?;
-        eprint!("{}", check::described(&checked, scene));
+        super::say(check::described(&checked, scene).trim_end_matches('\n'));
         let Verdict::Healthy = checked.verdict else {
             return Err(Failure::run(format!(
                 "the loop check failed, and the drive is off: {}; --no-check skips it",
@@ -156,10 +156,10 @@ impl ExperimentArguments {
         };
         let Some(linear) = checked.linear else { return Ok(plan) };
         let knowledge = plan.knowledge.measured(linear.response);
-        eprintln!(
+        super::say(format_args!(
             "The measured natural frequency has a standard uncertainty of {:.1e} Hz; what is compared with it shares this.",
             knowledge.linear.uncertainty / TAU
-        );
+        ));
         Ok(scene.plan_on(knowledge))
     }
 
@@ -194,7 +194,7 @@ impl ExperimentArguments {
                 let message = format!("these results are doubtful: {doubt}");
                 written.failures.push(Failure::new(LATE, message));
             } else if let Some(reason) = doubt(0.0) {
-                eprintln!("warning: {reason}");
+                super::say(format_args!("warning: {reason}"));
             }
             written
         }))

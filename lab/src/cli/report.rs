@@ -143,7 +143,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             line.into()
         };
         let shown = words(arguments, &line, &arguments.out).join(" ");
-        eprintln!("{shown}");
+        super::say(&shown);
         let command = Cli::try_parse_from(words(arguments, &line, new.path())).map_err(Failure::input)?;
         let (mut text, failure) = match dispatch(command.command) {
             Ok(results) => results.unseen(),

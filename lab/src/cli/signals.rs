@@ -73,7 +73,7 @@ fn wait() {
             thread::sleep(LOOK);
         }
     }
-    eprintln!("error: interrupted by {first}{}", zeroed().in_words());
+    super::say(format_args!("error: interrupted by {first}{}", zeroed().in_words()));
     process::end(first.exit_code());
 }
 

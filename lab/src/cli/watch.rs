@@ -95,7 +95,7 @@ impl WatchArguments {
         let (sender, receiver) = sync_channel(CHANNEL);
         let (view, target) = (View::new(scene.clone(), 0), scene.knowledge().target);
         let thread = thread::spawn(move || serve(&listener, address, &receiver, view, &table));
-        eprintln!("Watch it at http://{address}/");
+        super::say(format_args!("Watch it at http://{address}/"));
         let (command, thread) = (Rc::default(), Some(thread));
         Ok(Some(Watch { sender, command, thread, target, failure: None }))
     }

@@ -131,6 +131,26 @@ fn every_command_that_waits_ends_with_the_code_of_the_signal() {
 }
 
 #[test]
+fn a_signal_ends_a_program_whose_messages_nobody_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("scene.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut program = Running::start_with_default_signals(&words(&format!("theory --scene {}", pipe.display())));
+    program.catches();
+    drop(program.0.stderr.take());
+    program.signal("TERM");
+    let began = Instant::now();
+    let code = loop {
+        if let Some(status) = program.0.try_wait().unwrap() {
+            break status.code();
+        }
+        assert!(began.elapsed() < Duration::from_secs(120), "it does not end");
+        sleep(Duration::from_millis(10));
+    };
+    assert_eq!(code, Some(143));
+}
+
+#[test]
 fn a_map_and_servers_end_at_the_first_signal() {
     let long = "--x sigma=-5:5:2000 --y G=0.1:3:2000";
     let folder = tempfile::tempdir().unwrap();

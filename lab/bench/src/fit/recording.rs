@@ -3,22 +3,25 @@
 //! The curve is that of [`vines_identify::identify`]: held levels, sweeps and decays are one case, and the phase does not matter. Before that, the
 //! channels are made displacements, and what is no measurement of a rig near resonance is refused.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 use std::fmt::{self, Display, Formatter};
 
+use nalgebra::DVector;
+use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
+use vines_estimate::Oscillations;
 use vines_identify::{
     IdealRig, Identified, MOTIONS, MeasuredCurve, Quantity, Samples, Signals, Unidentified, identify,
 };
-use vines_model::numerics::{Estimate, mean, range};
+use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
 use vines_model::{Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
 use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, ParticleState};
 use vines_scene::scene::{Scene, Units};
 
 use super::decimals;
-use crate::identification::{Harmonic, Line, PHASE_RANGE, harmonic};
+use crate::identification::Line;
 
 /// Two channels of a measurement, sampled at equal distances.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,8 +95,6 @@ impl RecordingError {
     }
 }
 
-/// Periods of the fits that make the clock, and of those of a decay.
-const CLOCK_WINDOW: f64 = 2.5;
 /// Periods within which a constant hardly drifts.
 const SLOW: usize = 16;
 /// How often the drift of an integral is removed: twice leaves of noise at a quarter of the natural frequency, which two integrals raise sixteen times, as
@@ -105,22 +106,21 @@ const EDGE: f64 = 0.5 * (SLOW + 3) as f64;
 const FEWEST_PERIODS: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
-/// Fewest periods of a decay.
+/// Fewest periods of a decay, and periods of the pieces whose damping is compared.
 const FEWEST_OF_DECAY: usize = 8;
 /// Smallest damping ratio of a structure.
 const LEAST_DAMPING: f64 = 1e-5;
-/// Base over its largest amplitude below which it rests, unless the noise is larger.
+/// Largest share of the response that a base at rest would make at resonance.
 const RESTS: f64 = 0.02;
-/// Smallest amplitude of an oscillation over its standard uncertainty.
-const SEEN: f64 = 8.0;
 /// Share of the samples at the same extreme value from which a channel is clipped: a sine that is sampled 100 times a period and rounded to 10
 /// bits has 4 %.
 const CLIPPED_SHARE: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
 const NEAR_RESONANCE: f64 = 0.2;
-/// Largest ratio of the damping in the two halves of a linear decay, and in a piece and the whole, and of its inverse: impacts in 1:1 motion double
-/// the loss near the fold.
+/// Largest ratio of the damping in a piece of a linear decay to that of the whole, and of its inverse: impacts in 1:1 motion double the loss near the
+/// fold.
 const DAMPING_RATIO: f64 = 1.5;
+
 impl Recording {
     /// What is known, with the sample time and the channels of this recording.
     fn knowledge(&self, knowledge: &Knowledge) -> Knowledge {
@@ -165,28 +165,39 @@ impl Recording {
         Ok(one)
     }
 
-    /// The linear decay, if the base rests all the time and the damping does not depend on the amplitude.
+    /// The linear decay, if the base rests all the time and the damping does not depend on the amplitude: one free oscillation, from the period with the
+    /// largest response to the first one that noise hides.
     ///
     /// # Errors
     /// As [`Recording::prepared`], and where the base rests and the response does not decay.
     pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<LinearDecay>, RecordingError> {
         let knowledge = self.knowledge(knowledge);
         let one = self.prepared(&knowledge)?;
-        let anchors = one.anchors(&knowledge);
-        let fits: Vec<&Harmonic> = anchors.iter().filter_map(|one| one.response.as_ref()).collect();
-        if anchors.iter().any(|one| one.drive.is_some()) || 2 * fits.len() < anchors.len() && self.drive_is_named() {
+        let [response, base] = [0, 1].map(|channel| one.fundamentals(channel, &knowledge));
+        if is_driven(&response, &base, knowledge.linear.bandwidth()) {
             return Ok(None);
         }
-        let largest = fits.iter().map(|one| one.amplitude).fold(0.0, f64::max);
-        let decaying: Vec<(f64, &Harmonic)> = anchors
-            .iter()
-            .map(|one| (one.middle * self.sample_time, one.response.as_ref()))
-            .skip_while(|(_, one)| one.is_none_or(|one| one.amplitude < largest))
-            .map_while(|(time, one)| Some((time, one?)))
-            .collect();
-        let all = rate(&decaying);
-        let mean_omega = omega(&decaying);
-        if decaying.len() < FEWEST_OF_DECAY || all.value < SEEN * all.uncertainty {
+        let size = |n: &usize| response[*n].value.norm();
+        let begin = (0..response.len()).max_by(|one, other| size(one).total_cmp(&size(other)));
+        let begin = begin.unwrap_or_default();
+        let seen: Vec<&Fundamental> = response[begin..].iter().take_while(|one| one.is_seen()).collect();
+        // Change of the logarithm from sample to sample.
+        let natural = knowledge.linear.omega0 * self.sample_time;
+        let period = (TAU / natural).round() as usize;
+        let change = seen
+            .windows(2)
+            .map(|pair| pair[1].value * pair[0].value.conj())
+            .sum::<Complex64>()
+            / seen.iter().map(|one| one.value.norm_sqr()).sum::<f64>();
+        let start = Complex64::new(0.0, natural) + change.ln() / period as f64;
+        let fitted = |values: &[f64]| {
+            let found = Oscillations::new(values.iter().copied(), [0.0, 1.0], 0, &[], start, 0.0);
+            let of_pole = found.u(&[Complex64::ZERO, Complex64::ONE]);
+            (found.pole, found.variance(found.pole.im, period).sqrt() * of_pole)
+        };
+        let values = &one.response[begin * period..(begin + seen.len()) * period];
+        let decay = (seen.len() >= FEWEST_OF_DECAY).then(|| fitted(values));
+        let Some((pole, u)) = decay.filter(|(pole, u)| -pole.re > SIGNIFICANT * u) else {
             let Self { origin, channels: [response, drive], .. } = self;
             let base = if self.drive_is_named() {
                 format!("the base {drive} rests")
@@ -197,17 +208,23 @@ impl Recording {
                 "{origin}: {base}, and the response {response} does not decay for {FEWEST_OF_DECAY} periods. Name the channel of the base with --drive NAME:UNIT; if it is named, is \
                  it connected?"
             )));
+        };
+        let pieces = values.chunks_exact(FEWEST_OF_DECAY * period);
+        let significant = (SIGNIFICANT.powi(2) + 2.0 * (pieces.len() as f64).ln()).sqrt();
+        let is_another = |values: &[f64]| {
+            let (of_piece, u) = fitted(values);
+            let is_alike = (1.0 / DAMPING_RATIO..DAMPING_RATIO).contains(&(of_piece.re / pole.re));
+            !is_alike && (of_piece.re - pole.re).abs() > significant * u
+        };
+        if pieces.into_iter().any(is_another) {
+            return Ok(None);
         }
-        let (first, second) = decaying.split_at(decaying.len() / 2);
-        let is_steady =
-            |[one, other]: [Estimate; 2]| (1.0 / DAMPING_RATIO..DAMPING_RATIO).contains(&(one.value / other.value));
-        // Held levels whose base is not recorded fall as slowly in both halves, but in steps.
-        let is_step = |one: Estimate| !is_steady([one, all]) && (one.value - all.value).abs() > SEEN * one.uncertainty;
-        let has_steps = decaying
-            .chunks_exact(2 * FEWEST_OF_DECAY)
-            .any(|piece| is_step(rate(piece)));
-        let is_linear = is_steady([first, second].map(rate)) && !has_steps;
-        Ok(is_linear.then(|| LinearDecay { omega: mean_omega, zeta: all.scaled(1.0 / mean_omega.value) }))
+        let estimate = |value: f64| Estimate {
+            value: value / self.sample_time,
+            uncertainty: u / self.sample_time,
+        };
+        let [omega, rate] = [pole.norm(), -pole.re].map(estimate);
+        Ok(Some(LinearDecay { omega, zeta: rate.scaled(1.0 / omega.value) }))
     }
 
     fn drive_is_named(&self) -> bool {
@@ -271,40 +288,28 @@ impl Recording {
         Ok(())
     }
 
-    /// The displacements of both channels at intervals of a period.
-    fn anchors(&self, knowledge: &Knowledge) -> Vec<Anchor> {
-        let (dt, linear) = (self.sample_time, &knowledge.linear);
-        let period = TAU / linear.omega0 / dt;
-        let window = (CLOCK_WINDOW * period).round() as usize + 1;
-        let step = (period.round() as usize).max(1);
-        let mut omega = linear.omega0;
-        let mut anchors: Vec<Anchor> = (0..(self.response.len() + 1).saturating_sub(window))
-            .step_by(step)
-            .map(|from| {
-                let fit = |values: &[f64], omega| {
-                    let found = harmonic(&values[from..from + window], dt, omega);
-                    found.filter(|harmonic| {
-                        harmonic.amplitude > SEEN * harmonic.uncertainties[0]
-                            && (harmonic.omega / omega - 1.0).abs() < NEAR_RESONANCE
-                    })
-                };
-                let response = fit(&self.response, omega).or_else(|| fit(&self.response, linear.omega0));
-                omega = response.map_or(linear.omega0, |harmonic| harmonic.omega);
-                let displacement =
-                    |channel| move |harmonic: Harmonic| harmonic.displacement(channel, &knowledge.target);
-                Anchor {
-                    middle: from as f64 + 0.5 * (window - 1) as f64,
-                    response: response.map(displacement(0)),
-                    drive: fit(&self.drive, omega).map(displacement(1)),
-                }
-            })
-            .collect();
-        let drives = anchors.iter().filter_map(|anchor| anchor.drive);
-        let largest = drives.map(|drive| drive.amplitude).fold(0.0, f64::max);
-        for anchor in &mut anchors {
-            anchor.drive = anchor.drive.filter(|drive| drive.amplitude > RESTS * largest);
-        }
-        anchors
+    /// The fundamental of a channel, 0 the response or 1 the base, one natural period of the scene after the other.
+    fn fundamentals(&self, channel: usize, knowledge: &Knowledge) -> Vec<Fundamental> {
+        let omega0 = knowledge.linear.omega0;
+        let turn = omega0 * self.sample_time;
+        let period = (TAU / turn).round() as usize;
+        let phases: Vec<f64> = (0..period).map(|n| n as f64 * turn).collect();
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
+        let unit = knowledge.target.displacement(channel, omega0);
+        let fundamental = |(n, values): (usize, &[f64])| {
+            let values = DVector::from_column_slice(values);
+            let fit = basis.fit(&values)?;
+            let rest = basis.residual(&values, &fit).norm_squared() / (period - basis.terms()) as f64;
+            let phase = Complex64::cis(-turn * (n * period) as f64);
+            let noise = rest * unit.norm_sqr() * 2.0 / period as f64;
+            Some(Fundamental { value: fit.harmonic(1) * unit * phase, noise })
+        };
+        let values = [&self.response, &self.drive][channel];
+        values
+            .chunks_exact(period)
+            .enumerate()
+            .filter_map(fundamental)
+            .collect()
     }
 
     /// The curve of phase resonance of a rig that is about as `scene` says, and the motions that the recording shows.
@@ -314,7 +319,7 @@ impl Recording {
     pub fn curve(&self, scene: &Scene) -> Result<(MeasuredCurve, Vec<Stretch>), RecordingError> {
         let knowledge = self.knowledge(&scene.knowledge());
         let one = self.prepared(&knowledge)?;
-        one.plausible(&one.anchors(&knowledge), &knowledge)?;
+        one.plausible(&knowledge)?;
         let Self { origin, sample_time, measurands, .. } = &one;
         // A filter before the sampling passes less of the natural frequency.
         let passed = |channel: usize, values: &[f64]| {
@@ -352,34 +357,33 @@ impl Recording {
 
     /// Refuses channels of which the response has no oscillation near the natural frequency, and channels that are swapped, or of which one has the
     /// wrong sign.
-    fn plausible(&self, anchors: &[Anchor], knowledge: &Knowledge) -> Result<(), RecordingError> {
+    fn plausible(&self, knowledge: &Knowledge) -> Result<(), RecordingError> {
         let Self { origin, channels: [response, drive], .. } = self;
         let (hertz, strongest, rate) = (knowledge.linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
-        let is_seen = 2 * anchors.iter().filter(|anchor| anchor.response.is_some()).count() >= anchors.len();
-        if !is_seen && (strongest / hertz - 1.0).abs() > NEAR_RESONANCE {
+        let [of_response, of_base] = [0, 1].map(|channel| self.fundamentals(channel, knowledge));
+        let pairs = || of_response.iter().zip(&of_base);
+        let turned: Complex64 = of_response
+            .windows(2)
+            .map(|pair| pair[1].value * pair[0].value.conj())
+            .sum();
+        let is_near = 2 * of_response.iter().filter(|one| one.is_seen()).count() >= of_response.len()
+            && turned.arg().abs() < NEAR_RESONANCE * TAU;
+        if !is_near && (strongest / hertz - 1.0).abs() > NEAR_RESONANCE {
             return Err(RecordingError(format!(
                 "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
                  If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
             )));
         }
-        let both: Vec<[Harmonic; 2]> = anchors
-            .iter()
-            .filter_map(|one| Some([one.response?, one.drive?]))
-            .collect();
-        let [of_response, of_base] = [0, 1].map(|n| mean(both.iter().map(|one| one[n].amplitude)));
-        let ratio = of_base / of_response;
+        let ratio = (power(&of_base) / power(&of_response)).sqrt();
         if ratio > 1.0 {
             return Err(RecordingError(format!(
                 "{origin}: channel {drive} (base) is {ratio:.1} times as large as channel {response} (response), and at resonance the response is the \
                  larger one: are the channels swapped, or their units different?"
             )));
         }
-        let is_near = |[response, base]: &[Harmonic; 2], phase: f64| {
-            let apart = response.phase - base.phase - phase;
-            (apart - TAU * (apart / TAU).round()).abs() < PHASE_RANGE
-        };
-        let near = |phase: f64| both.iter().filter(|one| is_near(one, phase)).count();
-        if near(FRAC_PI_2) > near(-FRAC_PI_2) {
+        // The base feeds a passive rig, which lags.
+        let fed: Complex64 = pairs().map(|(response, base)| response.value * base.value.conj()).sum();
+        if fed.im > fed.re.abs() {
             return Err(RecordingError(format!(
                 "{origin}: the response (channel `{response}`) leads the base (channel `{drive}`) by about a quarter of a period, where it lags on \
                  every passive rig: one of the channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
@@ -439,45 +443,30 @@ fn remove_drift(values: &mut [f64], period: usize, slow: usize) {
     }
 }
 
-/// Logarithmic rate of a decay, 1/s: the straight line through the logarithms of the amplitudes, weighted by their uncertainties.
-fn rate(fits: &[(f64, &Harmonic)]) -> Estimate {
-    let weight = |one: &Harmonic| (one.amplitude / one.uncertainties[0]).powi(2);
-    let sum =
-        |of: &dyn Fn(f64, &Harmonic) -> f64| fits.iter().map(|(time, one)| weight(one) * of(*time, one)).sum::<f64>();
-    let total = sum(&|_, _| 1.0);
-    let [middle, level] = [sum(&|time, _| time), sum(&|_, one| one.amplitude.ln())].map(|sum| sum / total);
-    let squares = sum(&|time, _| (time - middle).powi(2));
-    let slope = sum(&|time, one| (time - middle) * (one.amplitude.ln() - level)) / squares;
-    let misfit = sum(&|time, one| (one.amplitude.ln() - level - slope * (time - middle)).powi(2));
-    Estimate {
-        value: -slope,
-        uncertainty: uncertainty(misfit, squares, fits.len()),
+/// The fundamental of a channel in a period.
+struct Fundamental {
+    /// Complex amplitude in the frame of the natural frequency of the scene, a displacement, m.
+    value: Complex64,
+    /// Variance of a component by noise, m².
+    noise: f64,
+}
+
+impl Fundamental {
+    fn is_seen(&self) -> bool {
+        self.value.norm_sqr() > 2.0 * SIGNIFICANT.powi(2) * self.noise
     }
 }
 
-/// Weighted mean of the frequencies of a decay.
-fn omega(fits: &[(f64, &Harmonic)]) -> Estimate {
-    let weight = |one: &Harmonic| one.uncertainties[1].powi(-2);
-    let total: f64 = fits.iter().map(|(_, one)| weight(one)).sum();
-    let value = fits.iter().map(|(_, one)| weight(one) * one.omega).sum::<f64>() / total;
-    let misfit = fits
-        .iter()
-        .map(|(_, one)| weight(one) * (one.omega - value).powi(2))
-        .sum();
-    Estimate { value, uncertainty: uncertainty(misfit, total, fits.len()) }
+/// Mean square of the amplitudes, m².
+fn power(periods: &[Fundamental]) -> f64 {
+    mean(periods.iter().map(|one| one.value.norm_sqr()))
 }
 
-/// Standard uncertainty of a fit with this sum of weights: the fits of neighbouring periods overlap, and their scatter may exceed the noise.
-fn uncertainty(misfit: f64, weights: f64, count: usize) -> f64 {
-    (CLOCK_WINDOW.ceil() * (misfit / count as f64).max(1.0) / weights).sqrt()
-}
-
-/// Both channels at one time. The base rests, or the response cannot be seen, where there is no oscillation.
-struct Anchor {
-    /// In samples.
-    middle: f64,
-    response: Option<Harmonic>,
-    drive: Option<Harmonic>,
+/// Whether a base moves: more than its noise, and by more than the share [`RESTS`] of what makes the response at resonance, for a bandwidth over omega0.
+fn is_driven(response: &[Fundamental], base: &[Fundamental], bandwidth: f64) -> bool {
+    let noise = 2.0 * mean(base.iter().map(|one| one.noise));
+    let largest = noise * (1.0 + SIGNIFICANT / (base.len() as f64).sqrt());
+    power(base) > largest.max((RESTS * bandwidth).powi(2) * power(response))
 }
 
 /// The ideal rig of a scene: what is expected of the one that was recorded.

@@ -130,7 +130,9 @@ impl Content {
                 let (size, phase) = fit.harmonic(1).to_polar();
                 fit.harmonic(n) * Complex64::cis(-(n as f64) * phase) / size
             });
-            *error = error.hypot(0.5 * (one - two).norm());
+            // Noise alone changes them by 2 error² in the mean.
+            let changed = 0.25 * (one - two).norm_sqr() - 2.0 * error.powi(2);
+            *error = error.hypot(changed.max(0.0).sqrt());
         }
         Some(Self { tones: lines, ..content })
     }

@@ -403,7 +403,8 @@ fn distance_of_checked_lock(chain: &str) -> f64 {
 
 #[test]
 fn a_rig_that_was_checked_locks_on_the_exact_orbit() {
-    assert!(distance_of_checked_lock("") < 1e-3);
+    let distance = distance_of_checked_lock("");
+    assert!(distance < 1e-3, "{distance:e}");
 }
 
 /// The anti-alias filter makes the readings late, which the control knows.

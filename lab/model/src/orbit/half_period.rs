@@ -15,6 +15,7 @@ use super::flight::Flight;
 use super::multipliers::{self, Impact};
 use super::return_map::Stability;
 use super::symmetric::{Particle, SymmetricMotion, alternating};
+use crate::numerics::eigenvalues;
 
 /// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
 const HALF_PERIOD_ERROR: f64 = 1e-8;
@@ -65,7 +66,7 @@ impl HalfPeriod {
         let found = (self.flows.len() > 2)
             .then(|| multipliers::multipliers(&self.flows, self.impact))
             .flatten();
-        let all = || map(&self.flows, self.impact).complex_eigenvalues().as_slice().to_vec();
+        let all = || eigenvalues(map(&self.flows, self.impact));
         Stability::of(&found.unwrap_or_else(all))
     }
 
@@ -217,7 +218,7 @@ mod tests {
             let mu = (1.0 + uniform(0.1, 1.0)) / mobility;
             let impact = Impact { mu, kappa: mu * uniform(-3.0, 3.0) };
             let found = multipliers::multipliers(&flows, impact).unwrap();
-            worst = worst.max(apart(&found, map(&flows, impact).complex_eigenvalues().as_slice()));
+            worst = worst.max(apart(&found, &eigenvalues(map(&flows, impact))));
         }
         assert!(worst < 1e-10, "{worst:e}");
     }

@@ -3,10 +3,10 @@
 //! A motion starts in a section, an event or a phase of the base, and returns to it. The section has four coordinates; frequency and amplitude of
 //! the base are unknown as well, and two conditions select the motion.
 
-use nalgebra::{Complex, Matrix4, Matrix4x6, Matrix6, RowVector6, Vector4, Vector6};
+use nalgebra::{Complex, DMatrix, Matrix4, Matrix4x6, Matrix6, RowVector6, Vector4, Vector6};
 use serde::Serialize;
 
-use crate::numerics::{Equations, newton};
+use crate::numerics::{Equations, eigenvalues, newton};
 
 /// Unknowns of a periodic motion: four coordinates at its section, sigma, G.
 pub type Unknowns = Vector6<f64>;
@@ -46,7 +46,11 @@ impl Return {
     }
 
     pub(super) fn stability(&self) -> Stability {
-        Stability::of(self.monodromy().complex_eigenvalues().as_slice())
+        Stability::of(&eigenvalues(DMatrix::from_column_slice(
+            4,
+            4,
+            self.monodromy().as_slice(),
+        )))
     }
 }
 
