@@ -132,11 +132,12 @@ impl Curve {
     }
 
     /// What the record contradicts in a backbone: residuals of variance 1. Beyond its ends the backbone's force continues as it ends. `None` for
-    /// fewer than four points.
+    /// fewer than four points, and for points that do not rise.
     pub fn residuals(&self, backbone: &[[f64; 3]]) -> Option<DVector<f64>> {
         let logarithms: Vec<f64> = backbone.iter().map(|point| point[0].ln()).collect();
         let (first, last) = (*logarithms.first()?, *logarithms.last()?);
-        if logarithms.len() < 4 {
+        // No number rises.
+        if logarithms.len() < 4 || !logarithms.windows(2).all(|pair| pair[0] < pair[1]) {
             return None;
         }
         let spline = CubicSpline::new(

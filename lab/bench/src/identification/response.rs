@@ -56,7 +56,7 @@ struct Content {
     amplitude: f64,
     /// Amplitudes of the harmonics from the second on, relative.
     harmonics: Vec<f64>,
-    /// Their standard errors: by noise, and what a change of the motion adds, as both halves of the samples show.
+    /// Their standard errors: by noise, and what a change of the motion adds.
     errors: Vec<f64>,
     /// RMS of the residual, relative, and its part that is noise.
     rest: f64,
@@ -90,8 +90,14 @@ impl Content {
     }
 
     /// Fits what a channel reads, 0 the response or 1 the reference, with as many harmonics as belong to what `measurand` says; `None` for too few
-    /// samples or no motion.
-    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, channel: usize, measurand: Measurand) -> Option<Self> {
+    /// samples or no motion. `is_moving`: the motion may change in the meantime.
+    fn of(
+        samples: &[Sample],
+        knowledge: &Knowledge,
+        omega: f64,
+        (channel, measurand): (usize, Measurand),
+        is_moving: bool,
+    ) -> Option<Self> {
         let (sample_time, d) = (knowledge.sample_time, knowledge.numbers);
         let reading = |sample: &Sample| match channel {
             0 => sample.sensors.response,
@@ -118,23 +124,31 @@ impl Content {
             lines.push(line);
             (content, rest) = fitted(&values)?;
         }
-        // A change of the motion shows in both halves.
-        let half = n / 2;
+        let content = Self { tones: lines, ..content };
+        match is_moving {
+            true => content.changed(&values, turn, measurand),
+            false => Some(content),
+        }
+    }
+
+    /// With what a change of the motion, as both halves of the values show it, adds to the errors of the harmonics.
+    fn changed(mut self, values: &DVector<f64>, turn: f64, measurand: Measurand) -> Option<Self> {
+        let (n, half) = (values.len(), values.len() / 2);
         let of_half = basis(half, turn, measurand);
         let [first, second] =
             [0, n - half].map(|from| of_half.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
         let halves = [first?, second?];
-        for (n, error) in (2..).zip(&mut content.errors) {
+        for (n, error) in (2..).zip(&mut self.errors) {
             // Harmonics keep their phase relative to the fundamental.
             let [one, two] = halves.each_ref().map(|fit| {
                 let (size, phase) = fit.harmonic(1).to_polar();
                 fit.harmonic(n) * Complex64::cis(-(n as f64) * phase) / size
             });
             // Noise alone changes them by 2 error² in the mean.
-            let changed = 0.25 * (one - two).norm_sqr() - 2.0 * error.powi(2);
-            *error = error.hypot(changed.max(0.0).sqrt());
+            let change = 0.25 * (one - two).norm_sqr() - 2.0 * error.powi(2);
+            *error = error.hypot(change.max(0.0).sqrt());
         }
-        Some(Self { tones: lines, ..content })
+        Some(self)
     }
 
     /// The content of these values, and their residual, for a motion of the frequency `omega`, rad/s.
@@ -173,7 +187,7 @@ impl Content {
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, knowledge, omega, 0, ALL_HARMONICS)?;
+    let content = Content::of(samples, knowledge, omega, (0, ALL_HARMONICS), false)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
     Some(Tone {
@@ -184,7 +198,7 @@ pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64
 
 /// These samples without the foreign tones in their response; `None` if there are none.
 pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, knowledge, omega, 0, knowledge.target.measurands[0])?.tones;
+    let tones = Content::of(samples, knowledge, omega, (0, knowledge.target.measurands[0]), false)?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -208,7 +222,7 @@ pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) ->
 fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
     let content = knowledge
         .shaker
-        .and_then(|_| Content::of(samples, knowledge, omega, 1, ALL_HARMONICS));
+        .and_then(|_| Content::of(samples, knowledge, omega, (1, ALL_HARMONICS), false));
     content.is_some_and(|content| content.is_asymmetric(knowledge.target.measurands[1].order()))
 }
 
@@ -260,7 +274,7 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
 pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    match Content::of(samples, knowledge, omega.value, 0, ALL_HARMONICS) {
+    match Content::of(samples, knowledge, omega.value, (0, ALL_HARMONICS), false) {
         None => Regime::Unknown,
         Some(content) if content.is_irregular() => Regime::Other,
         Some(content) => {
@@ -278,7 +292,7 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
 /// [`regime_by_response`] of a few periods under the control of a loop, for the choice of the next move: the linear response counts as known. While the
 /// setpoint moves, what the harmonics do not describe is the way, and not irregular. `at`: mean response, m, base, m, and frequency, rad/s.
 pub(crate) fn regime_of_leg(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3], is_at_rest: bool) -> Regime {
-    match Content::of(samples, knowledge, at[2].value, 0, ALL_HARMONICS) {
+    match Content::of(samples, knowledge, at[2].value, (0, ALL_HARMONICS), true) {
         None => Regime::Unknown,
         Some(content) if is_at_rest && content.is_irregular() => Regime::Other,
         Some(content) => regime_of(&content, samples, knowledge, at, true),
