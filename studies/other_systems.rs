@@ -115,8 +115,8 @@ impl Other {
         std::array::from_fn(|i| self.motion[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
     }
 
-    /// Moves to the first impact, or for `h` seconds; returns how long.
-    fn step(&mut self, from: f64, h: f64, base: &Drive) -> f64 {
+    /// Moves to the first impact, or for `h` seconds; returns how long, `least` if the impact is at once.
+    fn step(&mut self, from: f64, h: f64, least: f64, base: &Drive) -> f64 {
         let particles = self.particles();
         let outside = |motion: &Motion| {
             let is_outside = |n: &usize| (motion[0] - motion[2 + 2 * n]).abs() > particles[*n][1];
@@ -136,13 +136,17 @@ impl Other {
             }
         }
         let hit = outside(&self.advanced(from, high, base)).unwrap_or(0);
-        self.motion = self.advanced(from, low, base);
+        // A particle that comes to rest at a wall hits it without end: it goes on by a thousandth of a step at least.
+        let moved = low.max(h.min(least));
+        self.motion = self.advanced(from, moved, base);
         let (ratio, dx) = (particles[hit][0], 3 + 2 * hit);
-        let jump = (1.0 + self.rig.r) * (self.motion[1] - self.motion[dx]) / (1.0 + ratio);
-        self.motion[1] -= ratio * jump;
-        self.motion[dx] += jump;
-        // Rounding must not hold it there.
-        low.max(1e-9 * h)
+        let approach = self.motion[1] - self.motion[dx];
+        if approach * (self.motion[0] - self.motion[dx - 1]) > 0.0 {
+            let jump = (1.0 + self.rig.r) * approach / (1.0 + ratio);
+            self.motion[1] -= ratio * jump;
+            self.motion[dx] += jump;
+        }
+        moved
     }
 }
 
@@ -156,7 +160,7 @@ impl System for Other {
         for n in 0..STEPS {
             let (begin, mut done) = (f64::from(n) * step, 0.0);
             while done < step {
-                done += self.step(begin + done, step - done, &base);
+                done += self.step(begin + done, step - done, 1e-3 * step, &base);
             }
         }
         Ok(())
