@@ -188,18 +188,24 @@ fn a_drive_without_a_stable_orbit_is_told_at_which_drives_one_is_stable() {
 }
 
 #[test]
-fn points_whose_impacts_are_asymmetric_though_their_response_looks_symmetric_are_counted() {
+fn points_whose_impacts_are_asymmetric_though_noise_hides_it_in_their_response_are_counted() {
     let folder = tempfile::tempdir().unwrap();
-    // From above, the motion of the mass regains its symmetry late.
-    let levels =
-        "--set=resonance.sensor=q1 --set=backbone.C_from=0.8 --set=backbone.C_to=0.66 --set=backbone.points=29";
-    let text = text(&vines(&format!("backbone {levels} --out {}", folder.path().display())));
-    let hidden = text
-        .lines()
-        .filter(|row| row.ends_with("  symmetric 1:1 / asymmetric 1:1"));
-    let count = hidden.count();
+    let tracked = |noise: &str| {
+        let levels =
+            "--set=resonance.sensor=q1 --set=backbone.C_from=0.8 --set=backbone.C_to=0.66 --set=backbone.points=15";
+        let out = folder.path().display();
+        let text = text(&vines(&format!(
+            "backbone {levels} --set=chain.snr={noise} --out {out}"
+        )));
+        let is_hidden = |row: &&str| row.ends_with("  symmetric 1:1 / asymmetric 1:1");
+        (text.lines().filter(is_hidden).count(), text)
+    };
+    // Noise hides an asymmetry.
+    let (count, text) = tracked("26");
     let line = format!("but whose impacts are asymmetric (not the symmetric backbone): {count}\n");
     assert!(count > 0 && text.contains(&line), "{text}");
+    let (count, text) = tracked("80");
+    assert_eq!(count, 0, "{text}");
 }
 
 #[test]
