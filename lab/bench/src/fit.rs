@@ -233,8 +233,11 @@ pub struct FitReport {
     /// The parameters, over the range of the hypotheses that are not excluded: first f0, zeta, r, b and epsilon, then, with a known scale, M, m, k and
     /// c.
     pub parameters: Vec<FittedParameter>,
-    /// Every hypothesis.
+    /// Every hypothesis that was fitted.
     pub hypotheses: Vec<HypothesisReport>,
+    /// Names of those that were not: the plant has no motions with the responses of the data near what is expected of the rig.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<&'static str>,
     /// Name of the hypothesis whose values are those of a scene: the ideal cavity if it is possible, otherwise the possible one that fits best.
     pub best: &'static str,
     /// Chi-square of this one.
@@ -344,6 +347,7 @@ impl Found {
         FitReport {
             describes: all.describes(),
             undetermined: all.undetermined().into_iter().map(|one| one.symbol()[0]).collect(),
+            without: all.without.iter().map(|one| one.names()[0]).collect(),
             parameters: parameters(expected, |quantity| all.range(quantity)),
             hypotheses: all.fits.iter().map(hypothesis).collect(),
             best: best.hypothesis.names()[0],

@@ -231,6 +231,8 @@ impl Fit {
 pub struct Hypotheses {
     /// Their fits.
     pub fits: Vec<Fit>,
+    /// Those without a fit: the plant has no motions with the responses of the data near what is expected of the rig.
+    pub without: Vec<Hypothesis>,
     /// Whether what is expected of the rig counts.
     has_scene: bool,
 }
@@ -427,7 +429,7 @@ impl Data {
     pub fn hypotheses(&self, expected: &Parameters, mut progress: impl FnMut(usize)) -> Result<Hypotheses, FitError> {
         let ideal = self.ideal(expected)?;
         let x = ideal.x;
-        let mut fits = vec![ideal];
+        let (mut fits, mut without) = (vec![ideal], Vec::new());
         for (n, hypothesis) in Hypothesis::ALL.into_iter().enumerate().skip(1) {
             progress(n);
             if self.is_excluded(hypothesis) {
@@ -456,7 +458,10 @@ impl Data {
                     vec![x, with(start, STRENGTHS[1]), with(unknowns(expected), STRENGTHS[0])]
                 }
             };
-            fits.extend(problem.best(starts.into_iter()));
+            match problem.best(starts.into_iter()) {
+                Some(fit) => fits.push(fit),
+                None => without.push(hypothesis),
+            }
         }
         let least = fits.iter().map(|fit| fit.chi_square).fold(f64::INFINITY, f64::min);
         let fewest = fits
@@ -472,7 +477,7 @@ impl Data {
             let exceeds = exceeds.then(|| format!("chi-square exceeds the smallest by {excess:.0}"));
             fit.excluded = fit.rejection().or(exceeds);
         }
-        Ok(Hypotheses { fits, has_scene: self.scene.is_some() })
+        Ok(Hypotheses { fits, without, has_scene: self.scene.is_some() })
     }
 
     /// Whether it is known that something does not act.

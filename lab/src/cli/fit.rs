@@ -391,10 +391,17 @@ fn verdict(report: &FitReport) -> String {
             some.join(", ")
         ),
     };
-    match &possible[..] {
+    let found = match &possible[..] {
         [] => "none of these describes the data".into(),
         some => format!(
             "± is the range over what is possible: {}{undetermined}",
+            some.join(", ")
+        ),
+    };
+    match &report.without[..] {
+        [] => found,
+        some => format!(
+            "{found}\nnot fitted, and not excluded: {}; the plant has no motions with these responses near the scene: give a nearer one",
             some.join(", ")
         ),
     }
