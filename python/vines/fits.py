@@ -57,6 +57,8 @@ class Fit(Result):
         The section `plant` of a scene, for `Scene(plant=...)`.
     undetermined : tuple of str
         Symbols of the first five parameters whose range, three times as wide, contains 0.
+    not_fitted : tuple of str
+        Hypotheses that are neither fitted nor excluded: the plant has no motions with these responses near the scene.
     linear : tuple of dict
         Linear responses, with the state of the particle that agrees with the data, and the rises of chi-square with
         the particle carried along and free. A response whose state is `unknown` is left out.
@@ -77,6 +79,7 @@ class Fit(Result):
     residuals: NDArray[np.float64]
     plant: dict[str, float]
     undetermined: tuple[str, ...]
+    not_fitted: tuple[str, ...]
     linear: tuple[dict[str, Any], ...]
     stretches: tuple[dict[str, Any], ...]
 
@@ -270,6 +273,7 @@ def _fit(
         residuals=np.array(report["residuals"]).reshape(-1, 3),
         plant=found["plant"],
         undetermined=tuple(report["undetermined"]),
+        not_fitted=tuple(report.get("not_fitted", ())),
         linear=tuple(found["linear"]),
         stretches=tuple(found["stretches"]),
         **{key: report[key] for key in ("describes", "best", "chi_square", "p_value", "degrees")},

@@ -237,7 +237,7 @@ pub struct FitReport {
     pub hypotheses: Vec<HypothesisReport>,
     /// Names of those that were not: the plant has no motions with the responses of the data near what is expected of the rig.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub without: Vec<&'static str>,
+    pub not_fitted: Vec<&'static str>,
     /// Name of the hypothesis whose values are those of a scene: the ideal cavity if it is possible, otherwise the possible one that fits best.
     pub best: &'static str,
     /// Chi-square of this one.
@@ -347,7 +347,7 @@ impl Found {
         FitReport {
             describes: all.describes(),
             undetermined: all.undetermined().into_iter().map(|one| one.symbol()[0]).collect(),
-            without: all.without.iter().map(|one| one.names()[0]).collect(),
+            not_fitted: all.not_fitted.iter().map(|one| one.names()[0]).collect(),
             parameters: parameters(expected, |quantity| all.range(quantity)),
             hypotheses: all.fits.iter().map(hypothesis).collect(),
             best: best.hypothesis.names()[0],

@@ -232,7 +232,7 @@ pub struct Hypotheses {
     /// Their fits.
     pub fits: Vec<Fit>,
     /// Those without a fit: the plant has no motions with the responses of the data near what is expected of the rig.
-    pub without: Vec<Hypothesis>,
+    pub not_fitted: Vec<Hypothesis>,
     /// Whether what is expected of the rig counts.
     has_scene: bool,
 }
@@ -429,7 +429,7 @@ impl Data {
     pub fn hypotheses(&self, expected: &Parameters, mut progress: impl FnMut(usize)) -> Result<Hypotheses, FitError> {
         let ideal = self.ideal(expected)?;
         let x = ideal.x;
-        let (mut fits, mut without) = (vec![ideal], Vec::new());
+        let (mut fits, mut not_fitted) = (vec![ideal], Vec::new());
         for (n, hypothesis) in Hypothesis::ALL.into_iter().enumerate().skip(1) {
             progress(n);
             if self.is_excluded(hypothesis) {
@@ -460,7 +460,7 @@ impl Data {
             };
             match problem.best(starts.into_iter()) {
                 Some(fit) => fits.push(fit),
-                None => without.push(hypothesis),
+                None => not_fitted.push(hypothesis),
             }
         }
         let least = fits.iter().map(|fit| fit.chi_square).fold(f64::INFINITY, f64::min);
@@ -477,7 +477,7 @@ impl Data {
             let exceeds = exceeds.then(|| format!("chi-square exceeds the smallest by {excess:.0}"));
             fit.excluded = fit.rejection().or(exceeds);
         }
-        Ok(Hypotheses { fits, without, has_scene: self.scene.is_some() })
+        Ok(Hypotheses { fits, not_fitted, has_scene: self.scene.is_some() })
     }
 
     /// Whether it is known that something does not act.

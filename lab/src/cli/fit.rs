@@ -398,10 +398,10 @@ fn verdict(report: &FitReport) -> String {
             some.join(", ")
         ),
     };
-    match &report.without[..] {
+    match &report.not_fitted[..] {
         [] => found,
         some => format!(
-            "{found}\nnot fitted, and not excluded: {}; the plant has no motions with these responses near the scene: give a nearer one",
+            "{found}\nnot fitted, and not excluded: {}; the plant has no motions with these responses near the scene: give a scene that is nearer to the rig",
             some.join(", ")
         ),
     }

@@ -123,6 +123,29 @@ fn tracked_from_sensors(
     compared(&mut rig, &scene, &plan)
 }
 
+/// Below its fold a motion without impacts needs so little drive that noise hides the base.
+#[test]
+fn a_curve_that_ends_on_a_rig_without_reported_impacts_is_a_result_though_the_controller_stops_below() {
+    for (r, snr, stops) in [(0.36, 60, true), (0.4, 60, false), (0.4, 40, true), (0.44, 40, true)] {
+        let levels = "resonance.sensor=q1 backbone.C_from=0.4 backbone.C_to=0.14 backbone.points=14";
+        let rig =
+            format!("start.dq2=0 plant.epsilon=0.0042 plant.lambda=2.15 plant.r={r} chain.snr={snr} chain.seed=1");
+        let scene = dimensionless(&format!("{rig} {levels}"));
+        let plan = super::checked(&scene);
+        let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
+        let mut controller = BuiltIn::new(&plan.tracking).unwrap();
+        let tracked = track(&mut rig, &mut controller, &plan, |_, _| {}).unwrap();
+        assert!(tracked.ended.is_none(), "{r}, {snr} dB: {:?}", tracked.ended);
+        let end = tracked.end.unwrap();
+        assert_eq!(end.after.is_some(), stops, "{r}, {snr} dB: {end}");
+        assert_eq!(
+            end.to_string()
+                .contains(". After that, the controller switched the drive off"),
+            stops
+        );
+    }
+}
+
 #[test]
 fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
     // A cavity that is much wider than stated is never reached; a jammed particle moves with the mass.
