@@ -63,6 +63,14 @@ impl Parameters {
     pub fn gaps(&self) -> [f64; 2] {
         [self.cavity.b_plus, self.cavity.b_minus].map(|gap| gap.unwrap_or(self.half_width))
     }
+
+    /// Whether a motion has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of different restitution. Where it has
+    /// none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
+    pub fn has_mirror_images(&self) -> bool {
+        let r = Restitution::Constant(self.restitution);
+        let [plus, minus] = self.cavity.restitution.map(|law| law.unwrap_or(r));
+        self.cavity.tilt == 0.0 && plus == minus
+    }
 }
 
 /// How a wall returns the particle: the coefficient of restitution `r` at the speed of approach `v`.

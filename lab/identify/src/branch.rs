@@ -25,7 +25,7 @@ const PLACES: usize = 64;
 /// Speed of the particle, over that at the fold, at which the curve of an ideal cavity begins: beyond the fold the amplitude rises again.
 const BEYOND_THE_FOLD: f64 = 0.97;
 /// Largest speed of the particle over `b omega`: the symmetric motion loses its stability at 1.07.
-const FASTEST: f64 = 1.3;
+pub(crate) const FASTEST: f64 = 1.3;
 /// Fewest places of a curve.
 const FEWEST_PLACES: usize = 4;
 /// Relative gain of the squared distance from the curve at which the nearest place on it counts as found.

@@ -21,7 +21,7 @@ use vines_model::numerics::{Estimate, LeastSquares, Misfit, Regression, SIGNIFIC
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 
 use crate::branch::Branch;
-use crate::hypothesis::{Hypothesis, STRENGTHS, impact_speed, plant};
+use crate::hypothesis::{Hypothesis, TYPICAL, impact_speed, plant};
 use crate::ideal_rig::IdealRig;
 use crate::motions::{AMPLITUDES, Goal, MOTION_STEP, Motions, Place, backbone, uncertainties};
 use crate::points::MeasuredPoint;
@@ -440,23 +440,21 @@ impl Data {
             } else {
                 self.linear(expected)
             };
-            let friction = fits
-                .iter()
-                .find(|fit| fit.hypothesis == Hypothesis::Friction)
-                .map(|fit| fit.x);
             let with = |mut x: Unknowns, share: f64| {
                 (x[6], x[7]) = (Hypothesis::Friction.start(&x, share), hypothesis.start(&x, share));
                 x
             };
+            let friction = fits.iter().find(|fit| fit.hypothesis == Hypothesis::Friction);
+            let with_friction = friction.map_or(with(start, TYPICAL), |fit| {
+                let mut x = fit.x;
+                x[7] = hypothesis.start(&x, TYPICAL);
+                x
+            });
             let problem = self.problem(hypothesis, start);
-            let starts: Vec<Unknowns> = match (problem.has_motions(), friction) {
-                (false, _) => vec![start],
-                (true, None) => STRENGTHS.map(|share| with(start, share)).to_vec(),
-                (true, Some(mut x)) => {
-                    x[7] = hypothesis.start(&x, STRENGTHS[0]);
-                    // Where an ideal cavity is far from the data, the rig that is expected may be nearer.
-                    vec![x, with(start, STRENGTHS[1]), with(unknowns(expected), STRENGTHS[0])]
-                }
+            // Where an ideal cavity is far from the data, the rig that is expected may be nearer.
+            let starts = match problem.has_motions() {
+                false => vec![start],
+                true => vec![with_friction, with(start, 0.0), with(unknowns(expected), TYPICAL)],
             };
             match problem.best(starts.into_iter()) {
                 Some(fit) => fits.push(fit),

@@ -30,9 +30,9 @@ pub enum Hypothesis {
     Spring,
 }
 
-/// Strengths from which a search begins, typical, none and strong, over that which gives the particle the acceleration `b omega0²`: a typical
-/// friction and tilt are about 0.03 and 2 degrees on the default rig. Without a strength it is the ideal cavity that fits best.
-pub(crate) const STRENGTHS: [f64; 3] = [0.01, 0.0, 0.05];
+/// A typical strength, from which a search begins, over that which gives the particle the acceleration `b omega0²`: a typical friction and tilt are about
+/// 0.03 and 2 degrees on the default rig.
+pub(crate) const TYPICAL: f64 = 0.01;
 
 impl Hypothesis {
     /// All of them.

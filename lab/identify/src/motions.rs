@@ -9,6 +9,7 @@ use vines_estimate::Backbone;
 use vines_model::orbit::{Condition, PlantMotion, periodic_motion, resonant_motion};
 use vines_model::{Definition, Dimensionless};
 
+use crate::branch::FASTEST;
 use crate::hypothesis::Hypothesis;
 use crate::points::MeasuredPoint;
 use crate::quantity::Unknowns;
@@ -117,7 +118,10 @@ impl Motions<'_> {
         let (numbers, phase) = (Dimensionless::of(&self.plant, 0.0), definition.phase);
         let at = [at[0] / numbers.b, numbers.sigma(at[1])];
         let conditions = [Condition::Phase(phase), Condition::Across { phase, at, normal }];
-        periodic_motion(&self.plant, definition, near, conditions).ok()
+        let motion = periodic_motion(&self.plant, definition, near, conditions).ok()?;
+        // As in closed form: far above, the symmetric motion is so unstable that nobody has measured it.
+        let is_faster = motion.state.dq2.abs() > FASTEST * self.plant.half_width * motion.omega;
+        (!is_faster).then_some(motion)
     }
 
     /// As [`Self::motion`], with the direction of the curve there.

@@ -23,6 +23,13 @@ const STUDY: Definition = Definition {
 const FRICTION: Cavity = Cavity { kinetic_friction: 0.03, ..Cavity::IDEAL };
 const GAPS: Cavity = Cavity { b_plus: Some(0.011), b_minus: Some(0.009), ..Cavity::IDEAL };
 
+/// Beside the symmetric motion is one in which the particle sticks once a period.
+const STICKING: Cavity = Cavity {
+    kinetic_friction: 0.12,
+    static_friction: Some(0.18),
+    ..Cavity::IDEAL
+};
+
 /// The rig of the study, with a cavity.
 fn rig(cavity: Cavity) -> Parameters {
     Parameters {
@@ -161,15 +168,33 @@ fn near_the_fold_the_motion_is_the_one_that_continues_the_larger_responses() {
 
 #[test]
 fn where_the_particle_sticks_the_map_loses_a_dimension_and_the_motion_is_still_solved() {
-    let p = rig(Cavity {
-        kinetic_friction: 0.12,
-        static_friction: Some(0.18),
-        ..Cavity::IDEAL
-    });
+    let p = rig(Cavity { tilt: 0.002, ..STICKING });
     let motion = resonant_motion(&p, STUDY, 0.01, None).expect("a motion");
     assert_eq!((motion.impacts, motion.sticks), (2, 1), "{:?}", motion.events);
     assert!(motion.stability.multipliers[0].iter().all(|part| part.abs() < 1e-8) && motion.stability.stable);
     same(&p, &advanced(&p, &motion, 1000.0 * TAU), &motion.state, 1.0, 1e-10);
+}
+
+#[test]
+fn of_a_symmetric_plant_the_symmetric_motion_is_found_though_the_one_beside_it_is_stable() {
+    let p = rig(STICKING);
+    let motion = resonant_motion(&p, STUDY, 0.01, None).expect("a motion");
+    assert!(
+        motion.is_mirrored && motion.stability.is_unstable() && motion.sticks == 0,
+        "{motion:?}"
+    );
+    same(&p, &advanced(&p, &motion, PI), &motion.state, -1.0, 1e-10);
+    // The multipliers of half a period are those of the whole one: a tilt of nothing is no symmetric plant.
+    let tilted = rig(Cavity { tilt: 1e-12, ..STICKING });
+    let conditions = [
+        Condition::Phase(STUDY.phase),
+        Condition::Sigma(Dimensionless::of(&p, 0.0).sigma(motion.omega)),
+    ];
+    let whole = periodic_motion(&tilted, STUDY, &motion, conditions).expect("a motion");
+    assert!(!whole.is_mirrored);
+    for (one, other) in motion.stability.multipliers.iter().zip(&whole.stability.multipliers) {
+        close((one[0] - other[0]).hypot(one[1] - other[1]) + 1.0, 1.0, 1e-6);
+    }
 }
 
 #[test]

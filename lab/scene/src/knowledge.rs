@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use lovines::cavity::GRAVITY;
-use lovines::{Cavity, Parameters, Restitution};
+use lovines::{Cavity, Parameters};
 use num_complex::Complex64;
 use vines_model::numerics::{Estimate, mean, noise, noise_at};
 use vines_model::{Definition, Dimensionless, Measurand, Sensor};
@@ -197,7 +197,7 @@ impl Knowledge {
             linear,
             is_measured: false,
             numbers: Dimensionless { definition, ..Dimensionless::of(plant, amplitude) },
-            is_symmetric: has_mirror_images(plant),
+            is_symmetric: plant.has_mirror_images(),
             carried_up_to: carried_up_to(plant),
             sample_time,
             target,
@@ -251,14 +251,6 @@ impl Knowledge {
     pub fn is_at_phase_resonance(&self) -> bool {
         self.numbers.definition.is_phase_resonance()
     }
-}
-
-/// Whether a motion of a plant has a mirror image, half a period later, as in an ideal cavity: neither tilt nor walls of different restitution.
-/// Where it has none, the 1:1 motion is asymmetric. (Unequal gaps move the middle of the cavity only.)
-fn has_mirror_images(plant: &Parameters) -> bool {
-    let r = Restitution::Constant(plant.restitution);
-    let [plus, minus] = plant.cavity.restitution.map(|law| law.unwrap_or(r));
-    plant.cavity.tilt == 0.0 && plus == minus
 }
 
 /// Acceleration of the structure up to which static friction carries a particle that touches no wall, m/s²; 0 without friction.

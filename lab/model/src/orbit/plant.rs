@@ -1,9 +1,12 @@
 //! Periodic motions of the plant itself, with all effects of its cavity: the return map of a number of periods of the base.
 //!
+//! Of a plant that is symmetric, the map goes from half a period to half a period, and mirrors the state: the motion that continues the symmetric one
+//! of the ideal cavity is then found, and not one beside it that has lost its symmetry.
+//!
 //! The section is the phase of the base in the middle of the longest flight. Events stay away from it, and all four coordinates are free there,
 //! also where the particle sticks later: the map then loses rank, but the map minus the identity does not.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use lovines::cavity::Rebound;
 use lovines::{Cavity, Drive, Event, InvalidValue, Outcome, Parameters, Plant, Restitution, State, Wall};
@@ -30,6 +33,8 @@ pub struct PlantMotion {
     pub amplitude: f64,
     /// Periods of the base until the motion repeats.
     pub periods: u32,
+    /// Whether it is minus itself after half a period, by the equations that it solves.
+    pub is_mirrored: bool,
     /// First harmonic S of the response relative to the reference, m: the response has the part `Im(S exp(i phase))`.
     pub response: Complex<f64>,
     /// By the multipliers over the whole motion.
@@ -113,16 +118,16 @@ pub fn resonant_motion(
     }
 }
 
-/// The motion near `guess` that satisfies both conditions; of `guess`, only state, drive and number of periods matter. Lengths of
-/// the conditions are over the mean gap, and sigma and G are those of the plant.
+/// The motion near `guess` that satisfies both conditions, a mirrored one if `guess` is and the plant is symmetric; of `guess`, only this, state, drive
+/// and number of periods matter. Lengths of the conditions are over the mean gap, and sigma and G are those of the plant.
 pub fn periodic_motion(
     parameters: &Parameters,
     definition: Definition,
     guess: &PlantMotion,
     conditions: [Condition; 2],
 ) -> Result<PlantMotion, NoMotion> {
-    let PlantMotion { state, omega, amplitude, periods, .. } = *guess;
-    let section = PhaseSection::new(parameters, definition, periods)?;
+    let PlantMotion { state, omega, amplitude, periods, is_mirrored, .. } = *guess;
+    let section = PhaseSection::new(parameters, definition, periods)?.mirrored(is_mirrored);
     let start = unknowns(&section.numbers, &state, omega, amplitude);
     Ok(section.solve(0.0, start, conditions)?.motion)
 }
@@ -234,7 +239,8 @@ impl Ideal {
                 None => Condition::Excitation(self.at[5]),
             };
             let conditions = [Condition::Phase(definition.phase), second];
-            let found = PhaseSection::new(&partial, definition, 1)?.solve(phase, at, conditions);
+            let section = PhaseSection::new(&partial, definition, 1)?.mirrored(true);
+            let found = section.solve(phase, at, conditions);
             let is_beyond_fold = |found: &Solution| side.is_some_and(|side| side != found.side);
             match found {
                 // A particle that only rests is another motion: a linear one.
@@ -311,11 +317,13 @@ struct Solution {
     side: f64,
 }
 
-/// The map of a number of periods of the base. The unknowns are (q1, q1', q2, q2') at a phase of the base, sigma and G.
+/// The map of a number of periods of the base, or the mirrored one of half a period. The unknowns are (q1, q1', q2, q2') at a phase of the base, sigma
+/// and G.
 struct PhaseSection<'a> {
     parameters: &'a Parameters,
     numbers: Dimensionless,
     periods: u32,
+    is_mirrored: bool,
     /// Phase of the base at the section, rad.
     phase: f64,
     events: Vec<Event>,
@@ -331,9 +339,25 @@ impl<'a> PhaseSection<'a> {
             parameters,
             numbers: numbers(parameters, definition),
             periods,
+            is_mirrored: false,
             phase: 0.0,
             events: Vec::new(),
         })
+    }
+
+    /// The mirrored map, if it `is_mirrored` and the plant is symmetric.
+    fn mirrored(self, is_mirrored: bool) -> Self {
+        let [plus, minus] = self.parameters.gaps();
+        let is_mirrored = is_mirrored && self.parameters.has_mirror_images() && plus == minus;
+        Self { is_mirrored, ..self }
+    }
+
+    /// The angle of the base over the map, rad.
+    fn turn(&self) -> f64 {
+        match self.is_mirrored {
+            true => PI,
+            false => TAU * f64::from(self.periods),
+        }
     }
 
     /// The scales of the unknowns: b, b omega0, and what a change of sigma or G by 1 is.
@@ -352,7 +376,7 @@ impl<'a> PhaseSection<'a> {
         }
         let (drive, state) = (Drive::harmonic(amplitude, omega), State { q1, dq1, q2, dq2 });
         let plant = plant_at(self.parameters, state, drive, self.phase)?;
-        Some((plant, drive, TAU * f64::from(self.periods) / omega))
+        Some((plant, drive, self.turn() / omega))
     }
 
     /// The state after the motion. The events are kept.
@@ -410,22 +434,29 @@ impl<'a> PhaseSection<'a> {
     /// The motion at the solution `x`.
     fn motion(&mut self, x: &Unknowns) -> Option<PlantMotion> {
         let returned = self.at(x)?;
-        let (mut plant, drive, duration) = self.start(x)?;
+        let (mut plant, drive, _) = self.start(x)?;
         let Drive { omega, amplitude, .. } = drive;
         // A particle at rest in the section has settled on its wall, without the residual of the solution, where the phase is 0.
         plant.advance(drive, (TAU - self.phase) / omega).ok()?;
         let state = plant.state();
         let mut events = Vec::new();
         let record = |event: Event| events.push((omega * event.time(), event));
-        plant.advance_with(drive, duration, record).ok()?;
+        plant
+            .advance_with(drive, TAU * f64::from(self.periods) / omega, record)
+            .ok()?;
         let count = |is: fn(&Event) -> bool| events.iter().filter(|(_, event)| is(event)).count();
         Some(PlantMotion {
             state,
             omega,
             amplitude,
             periods: self.periods,
+            is_mirrored: self.is_mirrored,
             response: returned.response * self.numbers.b,
-            stability: returned.stability(),
+            stability: if self.is_mirrored {
+                returned.stability().twice()
+            } else {
+                returned.stability()
+            },
             impacts: count(|event| matches!(event, Event::Impact { .. })),
             rests: count(|event| matches!(event, Event::Stuck { .. })),
             sticks: count(|event| matches!(event, Event::Sticking { .. })),
@@ -453,9 +484,10 @@ impl ReturnMap for PhaseSection<'_> {
             definition: self.numbers.definition,
             scale: self.scale(),
         };
-        let apart = Vector4::from(self.numbers.state(&end)) - x.fixed_rows::<4>(0);
-        let turn = TAU * f64::from(self.periods);
-        Some(shooting.returned(&drive, turn, apart, shot.harmonic(), &by))
+        let sign = if self.is_mirrored { -1.0 } else { 1.0 };
+        by.fixed_rows_mut::<4>(0).scale_mut(sign);
+        let apart = Vector4::from(self.numbers.state(&end)) * sign - x.fixed_rows::<4>(0);
+        Some(shooting.returned(&drive, self.turn(), apart, shot.harmonic(), &by))
     }
 
     fn restarted(&mut self, x: &Unknowns) -> Option<Unknowns> {

@@ -85,6 +85,12 @@ impl Stability {
         }
     }
 
+    /// That of the map applied twice.
+    pub(super) fn twice(&self) -> Self {
+        let squares = self.multipliers.iter().map(|[re, im]| Complex::new(*re, *im).powi(2));
+        Self::of(&squares.collect::<Vec<_>>())
+    }
+
     /// Whether a multiplier is outside the unit circle.
     pub fn is_unstable(&self) -> bool {
         !self.stable && !self.neutral
