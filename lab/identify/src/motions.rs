@@ -59,6 +59,8 @@ pub(crate) const AMPLITUDES: usize = 24;
 const MOST_STEPS: usize = 30;
 /// Longest step along the curve, in units of its tangent.
 const LONGEST: f64 = 0.1;
+/// Number of steps that are tried, each half of the one before: beside a small particle the frequency may turn within a thousandth of b.
+const HALVINGS: i32 = 10;
 /// Difference of the response over b at which a motion is at a goal.
 const NEAR: f64 = 1e-3;
 /// Step of a difference of motions, along the curve and by an unknown: the root of the error of Newton's method, 1e-12.
@@ -158,8 +160,7 @@ impl Motions<'_> {
                 }
                 let ahead = (rest / place.tangent[0]).clamp(-LONGEST, LONGEST);
                 // Where the curve bends, a long step along its tangent finds no motion.
-                let steps = (0..MOST_STEPS).map(|n| ahead * 0.5_f64.powi(n as i32));
-                let mut steps = steps.take_while(|step| step.abs() >= NEAR.min(ahead.abs()));
+                let mut steps = (0..HALVINGS).map(|n| ahead * 0.5_f64.powi(n));
                 place = steps.find_map(|step| self.place(n, &place.motion, place.tangent, step))?;
             }
             (near, tangent) = (place.motion.clone(), place.tangent);
