@@ -844,7 +844,7 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
         limits[1] = [0.0, 1.0];
         limits[2] = [1e-3, 1.0];
         // Neither friction nor the square of a tilt is negative.
-        limits[6] = [0.0, 1.0];
+        limits[6][0] = 0.0;
         if self.hypothesis == Hypothesis::Tilt {
             limits[7][0] = 0.0;
         }
