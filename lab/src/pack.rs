@@ -70,7 +70,7 @@ pub fn components() -> [Component; 2] {
 /// The plant of a scene and the controller.
 ///
 /// # Errors
-/// A description that is not XML.
+/// As [`structure::component`].
 pub fn components_of(scene: &Scene) -> Result<[Component; 2], PackError> {
     let [oscillator, controller] = components();
     let plant = match &scene.structure {
@@ -142,6 +142,8 @@ pub enum PackError {
     Foreign(PathBuf),
     #[error("the description cannot be read: {0}")]
     Description(#[from] fmi2_description::Error),
+    #[error(transparent)]
+    Refused(#[from] lovines::Refused),
     #[error(transparent)]
     Archive(#[from] ZipError),
 }

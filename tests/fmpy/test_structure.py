@@ -12,7 +12,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-from component import Component, FMICallException, Fmu
+from component import Component, FMICallException, Fmu, own_experiment
 from references import ROOT
 
 POINTS = [f"{quantity}[{{}}]" for quantity in "qva"]
@@ -61,6 +61,12 @@ def test_the_description_is_valid_and_has_outputs_at_the_points(structure):
     expected = [name.format(point) for point in points if point not in ("force", "current") for name in POINTS]
     assert [name for name in structure.names("output") if "[" in name] == expected
     assert "M" not in structure.names("parameter")
+
+
+def test_the_experiment_inside_it_gives_the_results_beside_it_and_has_impacts(structure):
+    found, errors = own_experiment(structure)
+    assert max(errors.values()) < 1e-9, errors
+    assert found["impacts"][-1] >= 5
 
 
 def direct(structure: dict, drive: dict[str, float], dq2: float, times: np.ndarray) -> tuple[np.ndarray, int]:

@@ -1,13 +1,14 @@
-//! A lock of the default scene inside both FMUs, so that a new program can be tried before a rig is: parameters, the inputs sample by sample, and
-//! outputs to compare with. The files are those of an experiment of the draft FMI-LS-REF 1.0.0-alpha.1, in `resources/`.
+//! An experiment inside each FMU, so that a new program can be tried before a rig is: parameters, the inputs sample by sample, and outputs to compare
+//! with. For oscillator and controller it is a lock of the default scene, for a structure a sine. The files are those of the draft FMI-LS-REF
+//! 1.0.0-alpha.1, in `resources/`.
 
 use std::fmt::Write;
 
-use lovines::{Drive, InvalidValue, Plant};
+use lovines::{Drive, InvalidValue, Plant, Refused, StructureState};
 use phase_lock::{Config, Input, Output, PhaseLock};
 
 use super::{File, controller_values, parameter_set, plant_values};
-use crate::scene::{PAPER, Scene};
+use crate::scene::{PAPER, Scene, Structure};
 
 /// Samples per second, 23 in a natural period: fewer than those of the scene, to keep the files small, and times of few digits.
 const RATE: u32 = 200;
@@ -28,22 +29,21 @@ impl Half {
         }
     }
 
-    /// The files in `resources/`.
-    fn files(self, parameters: Vec<u8>) -> Vec<File> {
-        let step = 1.0 / f64::from(RATE);
+    /// The files in `resources/`, of an experiment of this name, meaning, stop time and step, s.
+    fn files(self, [name, meaning]: [&str; 2], [stop, step]: [f64; 2], parameters: Vec<u8>) -> Vec<File> {
         let experiment = format!(
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Experiments name=\"vines\">\n  <Experiment name=\"lock\" startTime=\"0\" \
-             stopTime=\"{STOP}\" stepSize=\"{step}\"\n    description=\"The coupled pair locks; each FMU gets what the other one has put out\">\n    \
-             <Parameters type=\"application/x-ssp-parameter-set\" source=\"lock.ssv\"/>\n    <Stimuli type=\"text/csv\" \
-             source=\"lock-stimuli.csv\"/>\n    <References type=\"text/csv\" source=\"lock-references.csv\"/>\n  </Experiment>\n</Experiments>\n"
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Experiments name=\"vines\">\n  <Experiment name=\"{name}\" startTime=\"0\" \
+             stopTime=\"{stop}\" stepSize=\"{step}\"\n    description=\"{meaning}\">\n    \
+             <Parameters type=\"application/x-ssp-parameter-set\" source=\"{name}.ssv\"/>\n    <Stimuli type=\"text/csv\" \
+             source=\"{name}-stimuli.csv\"/>\n    <References type=\"text/csv\" source=\"{name}-references.csv\"/>\n  </Experiment>\n</Experiments>\n"
         );
-        let files = [
-            ("experiments.xml", experiment.into_bytes()),
-            ("lock.ssv", parameters),
-            ("lock-stimuli.csv", self.stimuli.into_bytes()),
-            ("lock-references.csv", self.references.into_bytes()),
-        ];
-        files.map(|(name, content)| (name.to_owned(), content)).into()
+        [
+            ("experiments.xml".into(), experiment.into_bytes()),
+            (format!("{name}.ssv"), parameters),
+            (format!("{name}-stimuli.csv"), self.stimuli.into_bytes()),
+            (format!("{name}-references.csv"), self.references.into_bytes()),
+        ]
+        .into()
     }
 }
 
@@ -63,10 +63,58 @@ pub(super) fn resources() -> [Vec<File>; 2] {
         .build()
         .expect("the controller of the default scene allows this sample time");
     let [plant, controller] = couple(&scene, &lock).expect("the values of a correct scene are allowed");
+    let experiment = [
+        "lock",
+        "The coupled pair locks; each FMU gets what the other one has put out",
+    ];
+    let times = [f64::from(STOP), config.sample_time];
     [
-        plant.files(parameter_set("plant", plant_values(&scene))),
-        controller.files(parameter_set("controller", controller_values(&config))),
+        plant.files(experiment, times, parameter_set("plant", plant_values(&scene))),
+        controller.files(
+            experiment,
+            times,
+            parameter_set("controller", controller_values(&config)),
+        ),
     ]
+}
+
+/// Length of the experiment of a structure, periods of the driven mode: irregular motions of longer ones show rounding.
+const SINE_PERIODS: u32 = 20;
+
+/// The files of a structure under a sine of its driven mode's frequency: the inputs of signal and amplitude, and the amplitude that it has. `parameters`: the set of its
+/// parameters; `step`: the time from sample to sample, s.
+///
+/// # Errors
+/// Values that the plant refuses.
+pub(super) fn sine(
+    (structure, scene): (&Structure, &Scene),
+    ([signal, input], amplitude): ([&str; 2], f64),
+    step: f64,
+    parameters: Vec<u8>,
+) -> Result<Vec<File>, Refused> {
+    let start = StructureState {
+        q2: scene.start.q2,
+        dq2: scene.start.dq2,
+        ..StructureState::default()
+    };
+    let mut plant = Plant::with_host(structure.host.clone(), scene.plant, &start)?;
+    let [amplitude, omega] = [amplitude, structure.mode().omega].map(rounded);
+    let in_period = (std::f64::consts::TAU / (omega * step)).round() as u32;
+    let samples = SINE_PERIODS * in_period;
+    let mut half = Half::new(&format!("{signal},{input},omega"), "q1,q2,impacts");
+    for n in 0..=samples {
+        let time = f64::from(n) * step;
+        if n == 0 || n == samples {
+            let _ = writeln!(half.stimuli, "{time},0,{amplitude:e},{omega:e}");
+        }
+        if n > 0 && n % in_period == 0 {
+            let (masses, impacts) = (plant.state(), plant.totals().impacts);
+            let _ = writeln!(half.references, "{time},{:e},{:e},{impacts}", masses.q1, masses.q2);
+        }
+        plant.advance(Drive::harmonic(amplitude, omega), step)?;
+    }
+    let experiment = ["sine", "A sine of the driven mode's frequency"];
+    Ok(half.files(experiment, [f64::from(samples) * step, step], parameters))
 }
 
 /// Couples the cores as a master couples their FMUs: at each sample both are read, fed, and stepped.

@@ -12,7 +12,7 @@ use lovines::table::PARAMETERS;
 use phase_lock::Value;
 use serde_json::json;
 
-use super::{Component, START_PARAMETERS};
+use super::{Component, PackError, START_PARAMETERS, lock, parameter_set};
 use crate::scene::{ARMATURE, Channel, Excitation, Scene, SceneShaker, Structure, TABLE};
 use crate::table::Table;
 
@@ -24,8 +24,8 @@ const FILE: &str = "structure.json";
 /// The FMU of a structure, which has the library of the oscillator.
 ///
 /// # Errors
-/// A description that is not XML.
-pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -> Result<Component, Error> {
+/// A description that is not XML, and values that the plant refuses.
+pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -> Result<Component, PackError> {
     let starts = scene
         .start_values()
         .into_iter()
@@ -46,6 +46,20 @@ pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -
         stop: STRUCTURE_PERIODS * TAU / structure.mode().omega,
     };
     let xml = describe(&oscillator.xml, &facts)?;
+    let ([signal, input, _], ..) = facts.drive.names();
+    let parameters = scene.start_values().into_iter().filter(|(name, _)| {
+        let is_parameter = PARAMETERS.iter().any(|row| row.symbol == *name);
+        is_parameter && !ABSENT.contains(name)
+    });
+    // Behind a shaker, the command that makes this drive of a structure that does not move.
+    let units = structure.units();
+    let amplitude = units.command.of_metres(SINE_SHARE * scene.amplitude);
+    let experiment = lock::sine(
+        (structure, scene),
+        ([signal, input], amplitude),
+        step,
+        parameter_set("plant", parameters),
+    )?;
     Ok(Component {
         identifier: IDENTIFIER,
         package: oscillator.package,
@@ -53,9 +67,12 @@ pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -
         library_guid: oscillator.library_guid.clone(),
         png: b"",
         page: page(structure, step),
-        resources: vec![(FILE.into(), content)],
+        resources: [(FILE.to_owned(), content)].into_iter().chain(experiment).collect(),
     })
 }
+
+/// Drive of the experiment inside the FMU, over the scene's: within the limits of a shaker.
+const SINE_SHARE: f64 = 0.1;
 
 /// The end of the default experiment, periods of the driven mode.
 const STRUCTURE_PERIODS: f64 = 100.0;
