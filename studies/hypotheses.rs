@@ -105,14 +105,7 @@ fn points(rig: &Rig, definition: Definition, snr: f64, seed: u64) -> Option<Vec<
 
 /// A record of the rig, of all kinds of motion; `None` where most of it is not 1:1.
 fn record(rig: &Rig, snr: f64, seed: u64) -> Option<Recording> {
-    let of = |quantity: Quantity| quantity.of_plant(&rig.truth);
-    let ideal = IdealRig {
-        f0: of(Quantity::F0),
-        zeta: of(Quantity::Zeta),
-        r: of(Quantity::R),
-        b: of(Quantity::B),
-        epsilon: of(Quantity::Epsilon),
-    };
+    let ideal = IdealRig::of_plant(&rig.truth);
     let levels = schedule("mix", &ideal).ok()?;
     let mut plant = plant(rig.truth, levels[0]).ok()?;
     let found = recorded(&mut plant, &ideal, &levels, [snr, seed as f64]).ok()?;

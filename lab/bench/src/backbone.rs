@@ -8,7 +8,6 @@
 use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
-use vines_model::numerics::Estimate;
 use vines_rig::unit::Quantity;
 
 use crate::experiment::{ControlLoop, ExperimentError, Level, Script, Stage, is_reached};
@@ -33,8 +32,8 @@ pub struct LevelPoint {
     pub periods: f64,
     /// Periods averaged.
     pub averaged: usize,
-    /// The motion was steady within these uncertainties, on the level, and neither irregular nor asymmetric; otherwise the point was taken at the
-    /// time limit.
+    /// The motion was steady within these uncertainties, at its phase target and on the level, and neither irregular nor asymmetric; otherwise the point
+    /// was taken at the time limit.
     pub settled: bool,
     /// The response reached the level; otherwise the drive was at a limit, or the time too short.
     pub reached: bool,
@@ -63,7 +62,6 @@ pub struct LevelPoint {
 impl LevelPoint {
     /// Why the point has not settled, on a rig whose motions have mirror images or not; `None` if it has.
     pub fn unsettled(&self, is_symmetric: bool) -> Option<String> {
-        let Estimate { value: drive, uncertainty } = self.at.drive();
         Some(match self.regime {
             _ if self.settled => return None,
             _ if !self.reached => "the response does not reach the level".into(),
@@ -75,14 +73,7 @@ impl LevelPoint {
             }
             Regime::Other => "the motion is irregular".into(),
             Regime::Asymmetric if is_symmetric => "the motion is asymmetric".into(),
-            _ => match self.unsteady {
-                Some(unsteady) => format!("the motion is not steady: {unsteady}"),
-                None => format!(
-                    "{} periods give the drive to {:.2} % only",
-                    self.averaged,
-                    100.0 * uncertainty / drive
-                ),
-            },
+            _ => format!("the motion is not steady: {}", self.unsteady?),
         })
     }
 }
@@ -263,12 +254,12 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
         Ok(LevelPoint {
             clipped_percent,
             periods: self.script.run.periods - start,
-            ..self.point(level, &held, &criterion)
+            ..self.point(level, &held)
         })
     }
 
     /// The point of a level, m.
-    fn point(&self, level: f64, held: &Level, criterion: &Criterion) -> LevelPoint {
+    fn point(&self, level: f64, held: &Level) -> LevelPoint {
         let (knowledge, Level { estimate, cycles }) = (&self.plan.knowledge, held);
         let averaged = self.script.averaged(estimate, cycles);
         let [base, at] = estimate.at;
@@ -286,7 +277,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
             settled: reached
                 && regime != Regime::Other
                 && (regime != Regime::Asymmetric || !knowledge.is_symmetric)
-                && (estimate.unsteady.is_none() || criterion.is_met(estimate)),
+                && estimate.unsteady.is_none()
+                && !is_off_target(estimate.phase_error.value, estimate.phase_error.uncertainty),
             reached,
             unsteady: estimate.unsteady,
             regime,

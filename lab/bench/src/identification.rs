@@ -19,7 +19,7 @@ use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
 use vines_scene::scene::{Measurand, Units};
 
-pub(crate) use asked::{Departure, is_another};
+pub(crate) use asked::{Departure, SAME, is_another};
 pub(crate) use cycle::Cycle;
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
 pub(crate) use decay::{PER_PERIOD, base_at_rest, harmonic};
@@ -184,9 +184,9 @@ pub struct Lock {
     /// Standard uncertainty of B; absent where B is.
     #[serde(rename = "u_B")]
     pub u_b: Option<f64>,
-    /// Number of periods that the point is estimated from: the hold, and the periods before it with about the same amplitude and drive.
+    /// Number of periods that the point is estimated from: of the hold, and of those before it with about the same amplitude and drive.
     pub averaged: usize,
-    /// Growth of a disturbance per period, relative, up to which these periods would not show it: from 1e-6 of the response to the deviation that ends
+    /// Growth of a disturbance per period, relative, up to which all of these would not show it: from 1e-6 of the response to the deviation that ends
     /// them.
     pub unseen_growth: f64,
     /// From the start to the settled lock, in periods of the locked motion.
@@ -309,7 +309,7 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
         at_requested_drive: !is_another(at.drive().value - requested, at.drive().uncertainty, requested),
         b: b.map(|b| b.value),
         u_b: b.map(|b| b.uncertainty),
-        averaged: approach.len(),
+        averaged: level.periods,
         unseen_growth: (SPREAD / SMALLEST_DISTURBANCE).powf(1.0 / approach.len() as f64) - 1.0,
         periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
         held: record.held,

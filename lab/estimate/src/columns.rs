@@ -154,7 +154,7 @@ impl Columns {
         let sums: Vec<Complex64> = (0..places.len()).map(sum).collect();
         let lags = follow(&places, |k| match places[k].lag {
             Complex64::ZERO => Complex64::ZERO,
-            lag => -(places[k].local.sum(force.coefficients) - sums[k]) / (lag * force.lag) * lag,
+            _ => -(places[k].local.sum(force.coefficients) - sums[k]) / force.lag,
         });
         // Known, spline, lag: as forces in the frame.
         let row = |k: usize| -> Vec<Complex64> {

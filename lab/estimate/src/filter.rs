@@ -67,15 +67,6 @@ pub fn smooth(steps: &[&Step], states: &[[Vector2<f64>; 2]]) -> Vec<Vector2<f64>
     all
 }
 
-/// Variances that a filter is made with.
-#[derive(Debug, Clone, Copy)]
-pub struct Variances {
-    /// Share of the force beyond its lag that is noise of the process, as a variance.
-    pub process: f64,
-    /// Variance of the noise of the response over the measured one.
-    pub measured: f64,
-}
-
 /// The filter of a record.
 pub struct Filter {
     periods: Vec<Step>,
@@ -98,8 +89,9 @@ pub fn pair(z: Complex64) -> Vector2<f64> {
 }
 
 impl Filter {
-    /// Of a record whose periods are `used` or say nothing.
-    pub fn new(record: &Record, columns: &Columns, used: &[bool], variances: Variances) -> Self {
+    /// Of a record whose periods are `used` or say nothing. Variances: share of the force beyond its lag that is noise of the process, and noise of the
+    /// response over the measured one.
+    pub fn new(record: &Record, columns: &Columns, used: &[bool], [process_share, measured]: [f64; 2]) -> Self {
         let (noise, base) = (&record.periods.noise, &record.periods.base_noise);
         let mut covariance = Matrix2::zeros();
         let mut logarithms = 0.0;
@@ -109,12 +101,12 @@ impl Filter {
                 let duration = record.steps[k - 1];
                 transition = rotation(record.transition(duration)) + columns.feedback[k];
                 let moved = (record.linear.gain() * duration).norm_sqr();
-                process = 0.5 * moved * (variances.process * columns.beyond[k - 1] + base[k] + base[k - 1]);
+                process = 0.5 * moved * (process_share * columns.beyond[k - 1] + base[k] + base[k - 1]);
             }
             if !used[k] {
                 process += FORGET * noise[k];
             }
-            let measured = used[k].then_some(variances.measured * noise[k]);
+            let measured = used[k].then_some(measured * noise[k]);
             let step = Step::new(
                 transition,
                 Matrix2::from_diagonal_element(process),

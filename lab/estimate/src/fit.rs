@@ -5,7 +5,7 @@ use num_complex::Complex64;
 
 use crate::columns::{Columns, Force};
 use crate::curve::Curve;
-use crate::filter::{Filter, Variances};
+use crate::filter::Filter;
 use crate::interpolation::Basis;
 use crate::record::{Element, Record};
 use crate::search::simplex;
@@ -134,7 +134,7 @@ impl<'a> Estimate<'a> {
     }
 
     fn filter(&self, hyper: Hyper) -> Filter {
-        let variances = Variances { process: hyper[0], measured: hyper[2] };
+        let variances = [hyper[0], hyper[2]];
         Filter::new(self.record, &self.columns, &self.used, variances)
     }
 
@@ -258,11 +258,6 @@ impl<'a> Estimate<'a> {
             information,
             expected,
         })
-    }
-
-    /// The three variances.
-    pub fn variances(&self) -> Hyper {
-        self.hyper
     }
 }
 

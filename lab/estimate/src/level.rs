@@ -233,26 +233,16 @@ impl Level {
         sum.is_finite().then_some((level, path))
     }
 
-    fn complex(&self, place: usize) -> Complex64 {
-        Complex64::new(self.unknowns[place], self.unknowns[place + 1])
+    /// Lambda at the mean logarithm of the amplitude.
+    pub fn force(&self) -> Complex64 {
+        Complex64::new(self.unknowns[FORCE], self.unknowns[FORCE + 1])
     }
 
-    /// Lambda at this logarithm of the amplitude, relative to the mean one.
-    pub fn force(&self, ahead: f64) -> Complex64 {
-        self.complex(FORCE) + ahead * self.complex(SLOPES)
-    }
-
-    /// Lambda1.
-    pub fn slope(&self) -> Complex64 {
-        self.complex(SLOPES)
-    }
-
-    /// Standard uncertainty of the sum of the components of Lambda, at a logarithm of the amplitude, with these weights, and of disturbances with these.
-    pub fn uncertainty(&self, ahead: f64, force: Complex64, disturbances: &[f64]) -> f64 {
+    /// Standard uncertainty of the sum of the components of Lambda with these weights, and of disturbances with these.
+    pub fn uncertainty(&self, force: Complex64, disturbances: &[f64]) -> f64 {
         let mut weights = DVector::zeros(self.unknowns.len());
         for (part, weight) in [force.re, force.im].into_iter().enumerate() {
             weights[FORCE + part] = weight;
-            weights[SLOPES + part] = ahead * weight;
         }
         let first = weights.len() - self.disturbances;
         weights

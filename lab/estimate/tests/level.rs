@@ -74,8 +74,8 @@ fn motion(rig: Rig, count: usize, seed: u32) -> Motion {
 
 /// Errors of both components of the force at the mean amplitude over their uncertainties.
 fn pulls(rig: &Rig, level: &Level) -> [f64; 2] {
-    let error = level.force(0.0) - (FORCE + rig.slope * level.amplitude);
-    let u = [Complex64::ONE, Complex64::i()].map(|part| level.uncertainty(0.0, part, &[]));
+    let error = level.force() - (FORCE + rig.slope * level.amplitude);
+    let u = [Complex64::ONE, Complex64::i()].map(|part| level.uncertainty(part, &[]));
     [error.re / u[0], error.im / u[1]]
 }
 
@@ -135,7 +135,7 @@ fn a_beat_slower_than_the_record_widens_the_uncertainty_and_does_not_move_the_fo
         let mut motion = motion(rig, count, 1);
         motion.rings.extend(rings.then_some(pole));
         let level = Level::of(&motion).expect("a level");
-        level.uncertainty(0.0, Complex64::ONE, &[])
+        level.uncertainty(Complex64::ONE, &[])
     };
     assert!(u(10, true) > 10.0 * u(100, true));
 }
@@ -161,9 +161,9 @@ fn an_unknown_disturbance_of_the_drive_is_a_part_of_the_uncertainty() {
     let rates = motion.drive.clone();
     motion.disturbances.push(Disturbance { rates, deviation: 0.01 });
     let level = Level::of(&motion).expect("a level");
-    let u = level.uncertainty(0.0, Complex64::ONE, &[]);
+    let u = level.uncertainty(Complex64::ONE, &[]);
     assert!((u / (0.01 * DRIVE) - 1.0).abs() < 0.1, "{u}");
     // A factor of both changes the drive that holds the level by nothing.
-    let known = level.uncertainty(0.0, Complex64::ONE, &[DRIVE]);
+    let known = level.uncertainty(Complex64::ONE, &[DRIVE]);
     assert!(known < 0.1 * u, "{known} {u}");
 }

@@ -7,23 +7,23 @@
 //! A hypothesis is excluded where a channel rejects it, or where its chi-square exceeds the smallest one by more than chance allows. What remains is
 //! possible, and the range of a parameter is that over what remains.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use lovines::Parameters;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 use vines_estimate::{Backbone, Basis, CubicSpline, Curve};
 use vines_model::Definition;
-use vines_model::numerics::{Estimate, LeastSquares, Misfit, Regression, SIGNIFICANT, equally_spaced, mean, range};
+use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, equally_spaced, mean, range};
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 
 use crate::branch::Branch;
 use crate::hypothesis::{Hypothesis, TYPICAL, impact_speed, plant};
 use crate::ideal_rig::IdealRig;
-use crate::motions::{AMPLITUDES, Goal, MOTION_STEP, Motions, Place, backbone, uncertainties};
+use crate::motions::{AMPLITUDES, Goal, Motions, Place, backbone, uncertainties};
 use crate::points::MeasuredPoint;
 use crate::quantity::{Known, Quantity, STEP, UNKNOWNS, Unknowns, gradient, moved, unknowns};
 
@@ -535,14 +535,14 @@ impl Data {
                     .map(|one| one / drive.uncertainty.hypot(u_drive));
                 rows.extend([of_omega, of_drive]);
             }
-            let [first, second, third, values] =
-                [0, 1, 2, 3].map(|n| rows.iter().map(|row| row[n]).collect::<Vec<f64>>());
-            let columns = [first, second, third];
-            let fit = Regression::fit(&columns, &values, None, 1.0)?;
-            let [omega0, zeta, epsilon] = [0, 1, 2].map(|n| fit.coefficient(n));
+            let columns = DMatrix::from_fn(rows.len(), 3, |row, column| rows[row][column]);
+            let values = DVector::from_iterator(rows.len(), rows.iter().map(|row| row[3]));
+            let inverse = (columns.transpose() * &columns).cholesky()?;
+            let solution = inverse.solve(&columns.tr_mul(&values));
+            let [omega0, zeta, epsilon] = [0, 1, 2].map(|n| solution[n]);
             let at = [omega0, zeta, r, b, epsilon];
             let is_physical = omega0 > 0.0 && zeta > 0.0 && epsilon > 0.0;
-            is_physical.then_some((fit.excess, at))
+            is_physical.then_some(((values - columns * solution).norm(), at))
         });
         let (_, [omega0, zeta, r, b, epsilon]) = fits.min_by(|first, second| first.0.total_cmp(&second.0))?;
         let mass = expected.primary_mass.ln();
@@ -704,16 +704,8 @@ impl Problem<'_> {
         let known = self.data.known.iter().flat_map(|known| known.residuals(x, strength));
         let calibration = (self.hypothesis == Hypothesis::Reference).then(|| x[7] / self.data.calibration);
         let scene = self.data.scene.iter().flat_map(|scene| {
-            let values = [x[0].exp() / TAU, x[1], x[2], x[3].exp(), x[4].exp()];
-            let [f0, zeta, r, b, epsilon] = IdealRig::UNCERTAINTY;
-            let u = [
-                f0 * scene.f0,
-                zeta * scene.zeta,
-                r,
-                b * scene.b,
-                epsilon * scene.epsilon,
-            ];
-            let off = move |i: usize| (values[i] - scene.values()[i]) / u[i];
+            let u = scene.uncertainties();
+            let off = move |i: usize| (Quantity::FITTED[i].of(x) - scene.values()[i]) / u[i];
             (0..5).filter(|i| self.is_free(*i)).map(off).collect::<Vec<f64>>()
         });
         let held = (0..UNKNOWNS).filter(|i| !self.is_free(*i)).map(|i| x[i] - self.held[i]);
@@ -806,7 +798,6 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
     }
 
     fn derivatives(&self, x: &Unknowns, places: &Vec<Place>) -> Option<Vec<Unknowns>> {
-        let step = if self.has_motions() { MOTION_STEP } else { STEP };
         let here = self.at(x, places)?;
         // Of motions only what is perpendicular to the curve of `x` counts.
         let of_data = |x: &Unknowns| {
@@ -825,7 +816,7 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
         for i in (0..UNKNOWNS).filter(|i| self.is_free(*i) && *i != 5) {
             // Where there is no motion on one side the difference is taken on the other one, or is smaller: near the loss of symmetry a motion bears
             // hardly any tilt.
-            let steps = [1.0, -1.0, 0.1, -0.1, 0.01, -0.01].map(|share| share * step);
+            let steps = [1.0, -1.0, 0.1, -0.1, 0.01, -0.01].map(|share| share * STEP);
             let mut within = steps
                 .iter()
                 .filter(|step| (low[i]..=high[i]).contains(&(x[i] + **step)));

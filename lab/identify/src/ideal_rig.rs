@@ -2,11 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use lovines::Parameters;
 use nalgebra::SVector;
 use vines_estimate::{Backbone, Linear};
 use vines_model::{Definition, Dimensionless, Sensor};
 
 use crate::branch::Branch;
+use crate::quantity::Quantity;
 
 /// The parameters of an ideal cavity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +28,24 @@ pub struct IdealRig {
 impl IdealRig {
     /// Standard uncertainties of a drawing: f0 and zeta (relative), r, b and epsilon (relative).
     pub const UNCERTAINTY: [f64; 5] = [0.01, 0.25, 0.15, 0.1, 0.15];
+
+    /// The ideal rig of a plant.
+    pub fn of_plant(plant: &Parameters) -> Self {
+        let of = |quantity: Quantity| quantity.of_plant(plant);
+        Self {
+            f0: of(Quantity::F0),
+            zeta: of(Quantity::Zeta),
+            r: of(Quantity::R),
+            b: of(Quantity::B),
+            epsilon: of(Quantity::Epsilon),
+        }
+    }
+
+    /// Standard uncertainties of the values, if they are those of a drawing.
+    pub(crate) fn uncertainties(&self) -> [f64; 5] {
+        let [f0, zeta, r, b, epsilon] = Self::UNCERTAINTY;
+        [f0 * self.f0, zeta * self.zeta, r, b * self.b, epsilon * self.epsilon]
+    }
 
     /// f0, zeta, r, b and epsilon.
     pub fn values(&self) -> [f64; 5] {

@@ -12,7 +12,7 @@ use vines_model::{Definition, Dimensionless};
 use crate::branch::FASTEST;
 use crate::hypothesis::Hypothesis;
 use crate::points::MeasuredPoint;
-use crate::quantity::Unknowns;
+use crate::quantity::{STEP, Unknowns};
 
 /// What a motion is looked for near to.
 #[derive(Debug, Clone, Copy)]
@@ -63,8 +63,6 @@ const LONGEST: f64 = 0.1;
 const HALVINGS: i32 = 10;
 /// Difference of the response over b at which a motion is at a goal.
 const NEAR: f64 = 1e-3;
-/// Step of a difference of motions, along the curve and by an unknown: the root of the error of Newton's method, 1e-12.
-pub(crate) const MOTION_STEP: f64 = 1e-6;
 
 /// A plant whose curve is followed.
 pub(crate) struct Motions<'a> {
@@ -129,7 +127,7 @@ impl Motions<'_> {
     /// As [`Self::motion`], with the direction of the curve there.
     fn place(&self, n: usize, near: &PlantMotion, tangent: [f64; 2], ahead: f64) -> Option<Place> {
         let motion = self.motion(n, near, tangent, ahead)?;
-        let next = self.motion(n, &motion, tangent, MOTION_STEP)?;
+        let next = self.motion(n, &motion, tangent, STEP)?;
         let [length, rate] = self.units();
         let change = [
             (next.response.norm() - motion.response.norm()) / length,

@@ -16,7 +16,7 @@ pub(crate) const UNKNOWNS: usize = 8;
 /// The unknowns: the logarithm of omega0 (rad/s), zeta, r, the logarithms of b (m), epsilon and M (kg), the friction, and the strength of another effect.
 pub(crate) type Unknowns = SVector<f64, UNKNOWNS>;
 
-/// Step of a difference, relative or, of zeta and r, absolute: the curves are exact to 1e-12, and smooth.
+/// Step of a difference, relative or, of zeta and r, absolute: the root of the error of curves and motions, 1e-12.
 pub(crate) const STEP: f64 = 1e-6;
 
 /// The unknowns of a plant.
@@ -168,15 +168,12 @@ impl Known {
 
     /// Independent residuals over their standard uncertainties. `strength`: of an effect, 0 of all that the hypothesis has not.
     pub(crate) fn residuals(&self, x: &Unknowns, strength: impl Fn(Hypothesis) -> f64) -> Vec<f64> {
+        let off = |here: f64, Estimate { value, uncertainty }: Estimate| {
+            (here - value) / uncertainty.max(EXACT_VALUE * value.abs()).max(f64::MIN_POSITIVE)
+        };
         match self {
-            Self::Strength { hypothesis, estimate: Estimate { value, uncertainty } } => {
-                let uncertainty = uncertainty.max(EXACT_VALUE * value.abs()).max(f64::MIN_POSITIVE);
-                vec![(strength(*hypothesis) - value) / uncertainty]
-            }
-            Self::Value { quantity, estimate: Estimate { value, uncertainty } } => {
-                let uncertainty = uncertainty.max(EXACT_VALUE * value.abs()).max(f64::MIN_POSITIVE);
-                vec![(quantity.of(x) - value) / uncertainty]
-            }
+            Self::Strength { hypothesis, estimate } => vec![off(strength(*hypothesis), *estimate)],
+            Self::Value { quantity, estimate } => vec![off(quantity.of(x), *estimate)],
             Self::Linear(linear) => {
                 // The damper is the same, and the mass is M + m.
                 let added = match linear.particle {

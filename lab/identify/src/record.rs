@@ -11,6 +11,7 @@ use vines_model::numerics::{LeastSquares, Misfit};
 
 use crate::ideal_rig::IdealRig;
 use crate::particle::Particle;
+use crate::quantity::STEP;
 use crate::regime::{Expected, TOLERANCES, one_to_one, rough_scene};
 
 /// A record, and what its sensors are.
@@ -68,8 +69,6 @@ const STILL: f64 = 0.1;
 const FEWEST_PERIODS: usize = 30;
 /// Gain of a further step, relative to one and chi-square, at which the minimum counts as found.
 const LEAST_GAIN: f64 = 1e-6;
-/// Step of a central difference, relative.
-const DIFFERENCE_STEP: f64 = 1e-6;
 
 /// A least-squares model without traces.
 struct Model<F>(F);
@@ -84,7 +83,7 @@ impl<const N: usize, F: Fn(&SVector<f64, N>) -> Option<Vec<f64>>> Misfit<N> for 
     fn derivatives(&self, x: &SVector<f64, N>, (): &()) -> Option<Vec<SVector<f64, N>>> {
         let mut columns = Vec::new();
         for i in 0..N {
-            let [above, below] = [DIFFERENCE_STEP, -DIFFERENCE_STEP].map(|step| {
+            let [above, below] = [STEP, -STEP].map(|step| {
                 let mut moved = *x;
                 moved[i] += step;
                 (self.0)(&moved)
@@ -94,7 +93,7 @@ impl<const N: usize, F: Fn(&SVector<f64, N>) -> Option<Vec<f64>>> Misfit<N> for 
                 above
                     .iter()
                     .zip(&below)
-                    .map(|(a, b)| (a - b) / (2.0 * DIFFERENCE_STEP))
+                    .map(|(a, b)| (a - b) / (2.0 * STEP))
                     .collect::<Vec<f64>>(),
             );
         }

@@ -567,8 +567,6 @@ pub struct Estimate {
     pub uncertainty: f64,
 }
 
-/// Scatter over the noise beyond which it is a misfit.
-const MISFIT: f64 = 10.0;
 /// Quantile of the normal distribution for a two-sided interval of 95 %.
 const NORMAL: f64 = 1.959_964;
 
@@ -579,12 +577,12 @@ impl Estimate {
         Self { value, uncertainty }
     }
 
-    /// The mean of independent values.
+    /// The mean of independent values, with Student's distribution.
     pub fn mean(values: &[f64]) -> Self {
-        let fit = Regression::fit(&[vec![1.0; values.len()]], values, None, 0.0);
-        fit.map_or(Self { value: f64::NAN, uncertainty: f64::NAN }, |fit| {
-            fit.estimate(&[1.0])
-        })
+        let (count, value) = (values.len() as f64, mean(values.iter().copied()));
+        let scatter = standard_deviation(values) * (count / (count - 1.0)).sqrt();
+        let uncertainty = scatter * student_factor(count - 1.0) / count.sqrt();
+        Self { value, uncertainty }
     }
 
     /// In another unit.
@@ -604,99 +602,6 @@ pub fn student_factor(degrees: f64) -> f64 {
     let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n);
     let third = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / (384.0 * n * n * n);
     1.0 + (first + second + third) / z
-}
-
-/// Standard deviation of a sum of residuals over the one of as many independent values, from the correlation of neighbours (a process of first
-/// order): the effective number of values is smaller than their number.
-fn colour(residuals: &[f64]) -> f64 {
-    let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
-    let squares: f64 = residuals.iter().map(|residual| residual * residual).sum();
-    // A correlation over more than a twelfth of the record cannot be told from a trend.
-    let longest = (1.0 - 12.0 / residuals.len() as f64).clamp(0.0, 0.9);
-    let correlation = (neighbours / squares).clamp(0.0, longest);
-    ((1.0 + correlation) / (1.0 - correlation)).sqrt()
-}
-
-/// A linear least-squares fit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Regression {
-    coefficients: DVector<f64>,
-    covariance: DMatrix<f64>,
-    /// Standard deviation of the residuals over the standard deviation of the noise; 1 where the noise is not known.
-    pub excess: f64,
-}
-
-impl Regression {
-    /// Fits `values` by the sum of `columns`. `noise` is the standard deviation of a value, 0 where it is not known; where the
-    /// residuals scatter significantly more, their scatter counts, with Student's distribution and the correlation of neighbours. `prior` is what
-    /// is known of a coefficient in advance; it needs a known noise. `None` for too few values, or columns that are not independent.
-    pub fn fit(columns: &[Vec<f64>], values: &[f64], prior: Option<(usize, Estimate)>, noise: f64) -> Option<Self> {
-        let (rows, terms) = (values.len(), columns.len());
-        let degrees = (rows + usize::from(prior.is_some()))
-            .checked_sub(terms)
-            .filter(|n| *n > 0 || noise > 0.0)? as f64;
-        let mut matrix = DMatrix::from_fn(rows, terms, |row, column| columns[column][row]);
-        let mut right = DVector::from_column_slice(values);
-        // A prior counts as one more value, weighted by its uncertainty relative to the noise.
-        if let Some((coefficient, Estimate { value, uncertainty })) = prior {
-            let weight = noise / uncertainty;
-            matrix = matrix.insert_row(rows, 0.0);
-            right = right.insert_row(rows, value * weight);
-            matrix[(rows, coefficient)] = weight;
-        }
-        // Columns of very different size make the normal equations ill-conditioned; scaled to length 1 they are not.
-        let lengths: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
-        if lengths.contains(&0.0) {
-            return None;
-        }
-        for (mut column, length) in matrix.column_iter_mut().zip(&lengths) {
-            column /= *length;
-        }
-        let factors = matrix.clone().qr();
-        let inverse = factors.r().solve_upper_triangular(&DMatrix::identity(terms, terms))?;
-        let mut turned = right.clone();
-        factors.q_tr_mul(&mut turned);
-        let scaled = &inverse * turned.rows(0, terms);
-        let residual = &right - &matrix * &scaled;
-        let scatter = (residual.norm_squared() / degrees.max(1.0)).sqrt();
-        // White noise alone exceeds this in one case of twenty.
-        let is_noise = scatter <= noise * (1.0 + 1.64 / (2.0 * degrees).sqrt());
-        let deviation = if is_noise {
-            noise
-        } else {
-            // Residuals far above the noise come from the model: they are not a random process.
-            let colour = if scatter <= MISFIT * noise {
-                colour(&residual.as_slice()[..rows])
-            } else {
-                1.0
-            };
-            scatter * student_factor(degrees) * colour
-        };
-        let variance = deviation * deviation;
-        let excess = if noise > 0.0 { scatter / noise } else { 1.0 };
-        let covariance = DMatrix::from_fn(terms, terms, |i, j| {
-            inverse.row(i).dot(&inverse.row(j)) * variance / (lengths[i] * lengths[j])
-        });
-        let coefficients = DVector::from_fn(terms, |i, _| scaled[i] / lengths[i]);
-        coefficients
-            .iter()
-            .all(|value| value.is_finite())
-            .then_some(Self { coefficients, covariance, excess })
-    }
-
-    /// A coefficient.
-    pub fn coefficient(&self, n: usize) -> f64 {
-        self.coefficients[n]
-    }
-
-    /// The sum of the coefficients with these weights.
-    pub fn estimate(&self, weights: &[f64]) -> Estimate {
-        let weights = DVector::from_column_slice(weights);
-        Estimate {
-            value: weights.dot(&self.coefficients),
-            uncertainty: weights.dot(&(&self.covariance * &weights)).max(0.0).sqrt(),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -771,29 +676,6 @@ mod tests {
         let mean = Estimate::mean(&[1.0, 3.0, 5.0, 7.0, 9.0]);
         assert!((mean.value - 5.0).abs() < 1e-12);
         assert!((mean.uncertainty - (10f64 / 5.0).sqrt() * student_factor(4.0)).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_wandering_mean_is_less_certain_than_one_of_independent_values() {
-        // Each value repeated four times has a quarter of the independent ones.
-        let values: Vec<f64> = (0..200).map(|n| f64::from((n / 4 * 37) % 50) - 24.5).collect();
-        let fit = Regression::fit(&[vec![1.0; 200]], &values, None, 3.0).unwrap();
-        let independent = 50f64.mul_add(50.0, -1.0) / 12.0 / 200.0;
-        let ratio = fit.estimate(&[1.0]).uncertainty / independent.sqrt();
-        assert!((1.8..3.0).contains(&ratio), "{ratio}");
-    }
-
-    #[test]
-    fn a_known_noise_is_the_least_uncertainty_and_a_prior_narrows_it() {
-        let columns = [vec![1.0; 8], (0..8).map(f64::from).collect()];
-        let values: Vec<f64> = (0..8).map(|n| 2.0 + 0.5 * f64::from(n)).collect();
-        let fit = |prior| Regression::fit(&columns, &values, prior, 0.1).unwrap();
-        let free = fit(None).estimate(&[0.0, 1.0]).uncertainty;
-        assert!((fit(None).coefficient(1) - 0.5).abs() < 1e-12 && fit(None).excess < 1e-9);
-        assert!((free - 0.1 / 42f64.sqrt()).abs() < 1e-12);
-        let held = fit(Some((1, Estimate { value: 0.5, uncertainty: free })));
-        assert!((held.estimate(&[0.0, 1.0]).uncertainty - free / 2f64.sqrt()).abs() < 1e-9);
-        assert_eq!(Regression::fit(&[vec![0.0; 3]], &[1.0; 3], None, 0.1), None);
     }
 
     /// The valley of Rosenbrock, whose minimum is at (1, 1): the limits, and how narrow it is (10 in his example).

@@ -18,8 +18,8 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, SearchFound, Stage};
 use crate::identification::{
-    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, Unsteady, is_another, regime_by_response,
-    regime_of_leg, subharmonic, without_tones,
+    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, SAME, Unsteady, is_another,
+    regime_by_response, regime_of_leg, subharmonic, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
 use vines_scene::knowledge::Knowledge;
@@ -32,8 +32,6 @@ const CONTROL_PHASE_ERROR: f64 = 0.35;
 const LEG_CHANGE: f64 = 0.04;
 /// Largest additional drive of a move, as a share of the drive that holds the response: as much less drive must be possible, too.
 const MOVE_SHARE: f64 = 0.8;
-/// Shortest duration of a move, periods: the controller's loops take half of it.
-const SHORTEST_MOVE: f64 = 4.0;
 /// Duration of a rise of the response by the half-width, periods.
 const RISE: f64 = 60.0;
 /// Largest relative error of the half-width in the drawing.
@@ -44,8 +42,6 @@ const RESPONSES: [f64; 2] = [1.5, 0.05];
 const STEEPEST: f64 = 10.0;
 /// Smallest ratio of the setpoint to a response that follows it.
 const FOLLOWS: f64 = 0.8;
-/// Additional periods before the first level is measured, because the legs disturb the particle.
-const FIRST_PERIODS: usize = 24;
 
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
 pub(crate) type Held = [f64; 3];
@@ -411,7 +407,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let (to, periods) = self.step(level);
         self.setpoint = level;
         self.run.hold_response(to)?;
-        let late = (self.followed(level) + FIRST_PERIODS * usize::from(self.levels.is_empty())) as f64;
+        // The legs disturb the particle.
+        let late = (self.followed(level) + 3 * FOLLOWED * usize::from(self.levels.is_empty())) as f64;
         while self.run.periods - start < periods + late {
             self.cycle()?;
         }
@@ -432,7 +429,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         if drive.is_finite() && omega.is_finite() {
             let response = estimate.response.value;
             // Of points at one level, as at a limit of the drive, only the last one predicts the next.
-            self.levels.retain(|held| (held[0] - response).abs() > REACHED * level);
+            self.levels.retain(|held| (held[0] - response).abs() > SAME * level);
             self.levels.push([response, drive, omega]);
         }
         Ok(Level { estimate, cycles })
@@ -468,13 +465,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         FOLLOWED.max(of_control as usize).max(rung_down as usize)
     }
 
-    /// The move to a level, m, and its periods: [`SHORTEST_MOVE`], or as many as the drive needs for this change of the response; and behind a shaker, before and
+    /// The move to a level, m, and its periods: half of what the loops follow in, or as many as the drive needs for this change of the response; and behind a shaker, before and
     /// after the middle, as many as the control of the force needs to correct an error.
     fn step(&self, level: f64) -> (Move, f64) {
         let [response, drive, omega] = self.here();
         // A smooth move is twice as fast in its middle as on average.
         let late = self.knowledge.shaker.map_or(0.0, |path| 2.0 * OFF / (TAU * path.speed));
-        let periods = SHORTEST_MOVE.max(self.periods(level - response, level, drive)) + late;
+        let periods = f64::max(0.5 * FOLLOWED as f64, self.periods(level - response, level, drive)) + late;
         let expected = extrapolated(&self.levels, level);
         let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);
         let to = Move {
@@ -573,7 +570,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let Some(fit) = ResonanceFit::of(&cycles, self.knowledge) else {
             return self.measure(periods, is_at_rest);
         };
-        let [drive, omega] = fit.at(0.0);
+        let [drive, omega] = fit.at_mean();
         let leg = Leg {
             response: fit.response.value,
             last: cycles[cycles.len() - 1].amplitude(),
@@ -635,12 +632,9 @@ fn has_impacts(regime: Regime) -> bool {
     !matches!(regime, Regime::NoImpacts | Regime::NotEstablished | Regime::Unknown)
 }
 
-/// Largest relative difference of the response from its level that counts as reached.
-const REACHED: f64 = 0.01;
-
 /// Whether a response, m, is at the level, m.
 pub(crate) fn is_reached(Estimate { value, uncertainty }: Estimate, level: f64) -> bool {
-    (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)
+    (value - level).abs() <= (SAME * level).max(4.0 * uncertainty)
 }
 
 /// Drive, m, and frequency, rad/s, at the amplitude `response`, m, on the polynomial through the last points, three at most; `None` without any.

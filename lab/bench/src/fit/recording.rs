@@ -11,9 +11,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
 use vines_estimate::Oscillations;
-use vines_identify::{
-    IdealRig, Identified, MOTIONS, MeasuredCurve, Quantity, Samples, Signals, Unidentified, identify,
-};
+use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Unidentified, identify};
 use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
 use vines_model::{Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
@@ -471,14 +469,8 @@ fn is_driven(response: &[Fundamental], base: &[Fundamental], bandwidth: f64) -> 
 
 /// The ideal rig of a scene: what is expected of the one that was recorded.
 pub(super) fn rough(scene: &Scene) -> IdealRig {
-    let of = |quantity: Quantity| quantity.of_plant(&scene.plant);
-    IdealRig {
-        f0: of(Quantity::F0),
-        zeta: of(Quantity::Zeta).max(LEAST_DAMPING),
-        r: of(Quantity::R),
-        b: of(Quantity::B),
-        epsilon: of(Quantity::Epsilon),
-    }
+    let rig = IdealRig::of_plant(&scene.plant);
+    IdealRig { zeta: rig.zeta.max(LEAST_DAMPING), ..rig }
 }
 
 /// A part of a recording with one motion.

@@ -9,12 +9,12 @@ use crate::record::Sample;
 use vines_scene::plan::Plan;
 use vines_scene::scene::Dimensionless;
 
-/// Relative difference of a drive from the requested one up to which it is this drive, whatever its uncertainty.
-const SAME_DRIVE: f64 = 0.01;
+/// Relative difference of a drive or a response from the requested one up to which it is the same, whatever its uncertainty.
+pub(crate) const SAME: f64 = 0.01;
 
 /// Whether a drive that differs by `difference` with the standard uncertainty `u` is another one than `requested`; all in m.
 pub(crate) fn is_another(difference: f64, u: f64, requested: f64) -> bool {
-    difference.abs() > (SAME_DRIVE * requested).max(SIGNIFICANT * u)
+    difference.abs() > (SAME * requested).max(SIGNIFICANT * u)
 }
 
 /// What a controller holds otherwise than asked: steadily, in each of the last periods. What is still moving is no departure, but on its way.
@@ -39,7 +39,7 @@ impl Departure {
         let ([drive, omega], phase) = (measured.at, measured.phase_error);
         let requested = plan.requested(omega.value);
         let drives: Vec<f64> = cycles.iter().map(|cycle| cycle.base.norm() - requested).collect();
-        let another = departs(&drives, (SAME_DRIVE * requested).max(SIGNIFICANT * base_noise));
+        let another = departs(&drives, (SAME * requested).max(SIGNIFICANT * base_noise));
         let reported: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
         let reported = reported.map(mean);
         let phases: Vec<f64> = cycles

@@ -33,8 +33,6 @@ pub struct Cycle {
     pub order: i32,
     /// Number of samples.
     pub samples: usize,
-    /// Their duration, s.
-    pub duration: f64,
 }
 
 /// Harmonics that are fitted to a displacement.
@@ -153,7 +151,6 @@ impl Cycle {
             noise: [noise, base_noise],
             order: target.measurands[0].order(),
             samples: samples.len(),
-            duration: samples.len() as f64 * sample_time,
         })
     }
 

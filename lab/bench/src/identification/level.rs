@@ -132,11 +132,11 @@ impl Criterion {
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let fit = |slopes| ResonanceFit::held(cycles, &self.knowledge, slopes);
         let mut whole = fit(None)?;
-        let [base, omega] = whole.at(0.0).map(|value| value.value);
+        let [base, omega] = whole.at_mean().map(|value| value.value);
         if let Some(known) = self.slopes([whole.response.value, base, omega]) {
             whole = fit(Some(known))?;
         }
-        let at = whole.at(0.0);
+        let at = whole.at_mean();
         let is_finite = at.iter().all(|part| (part.value + part.uncertainty).is_finite());
         is_finite.then_some(LevelEstimate {
             periods: cycles.len(),

@@ -30,8 +30,6 @@ pub struct ResonanceFit {
     pub response: Estimate,
     /// Mean phase error, rad.
     pub phase_error: Estimate,
-    /// Scatter of the periods about the fit over the noise of the sensors.
-    pub excess: f64,
     level: Level,
     /// g, 1/s, and its relative uncertainty.
     gain: f64,
@@ -122,7 +120,6 @@ impl ResonanceFit {
         Some(Self {
             response: of(response * (level.amplitude - mean_before).exp(), noise),
             phase_error: of(mean(cycles.iter().map(|cycle| cycle.phase_error)), phase_noise),
-            excess: level.scatter(),
             level,
             gain,
             u_gain,
@@ -131,11 +128,10 @@ impl ResonanceFit {
         })
     }
 
-    /// Drive, m, and frequency, rad/s, at the mean amplitude plus `ahead`, m.
-    pub fn at(&self, ahead: f64) -> [Estimate; 2] {
-        let (change, tangent) = ((ahead / self.response.value).ln_1p(), self.target.tan());
-        let force = self.level.force(change);
-        let scale = -(self.response.value + ahead) / (self.gain * self.target.cos());
+    /// Drive, m, and frequency, rad/s, at the mean amplitude.
+    pub fn at_mean(&self) -> [Estimate; 2] {
+        let (force, tangent) = (self.level.force(), self.target.tan());
+        let scale = -self.response.value / (self.gain * self.target.cos());
         let drive = scale * force.re;
         // An error of g changes the force and what it is over alike.
         let by_gain = [-drive];
@@ -143,11 +139,11 @@ impl ResonanceFit {
         [
             Estimate {
                 value: drive,
-                uncertainty: self.level.uncertainty(change, scale.into(), by_gain),
+                uncertainty: self.level.uncertainty(scale.into(), by_gain),
             },
             Estimate {
                 value: self.omega + force.im + tangent * force.re,
-                uncertainty: self.level.uncertainty(change, Complex::new(tangent, 1.0), &[]),
+                uncertainty: self.level.uncertainty(Complex::new(tangent, 1.0), &[]),
             },
         ]
     }
@@ -155,7 +151,7 @@ impl ResonanceFit {
     /// What in these periods is not noise.
     pub fn unsteady(&self) -> Option<Unsteady> {
         match () {
-            () if !self.level.is_noise() => Some(Unsteady::Scatter(Some(self.excess))),
+            () if !self.level.is_noise() => Some(Unsteady::Scatter(Some(self.level.scatter()))),
             () if !self.level.is_white() => Some(Unsteady::Drift(self.level.correlation())),
             () => None,
         }
