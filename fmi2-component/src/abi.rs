@@ -7,6 +7,8 @@
 #![allow(clippy::missing_safety_doc)] // one contract for all, above
 
 mod functions;
+#[cfg(test)]
+mod tests;
 
 use std::any::Any;
 use std::borrow::Cow;

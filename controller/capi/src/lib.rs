@@ -256,6 +256,9 @@ fn halt(_: &core::panic::PanicInfo) -> ! {
 
 #[cfg(test)]
 mod tests {
+    use core::mem::MaybeUninit;
+    use core::ptr::{null, null_mut};
+
     use phase_lock::Detector;
 
     use super::*;
@@ -301,5 +304,75 @@ mod tests {
         unsafe { write_message(config.build().unwrap_err(), bytes.as_mut_ptr().cast(), bytes.len()) };
         let text = core::ffi::CStr::from_bytes_until_nul(&bytes).unwrap().to_str().unwrap();
         assert!(text.starts_with("sample_time = -1e300 s") && text.ends_with("allowed is above 0 (1e-30 to 1e30)"));
+    }
+
+    /// For Miri, which cannot run a C program: its calls, and a copy of the storage as memcpy makes it.
+    #[test]
+    fn a_controller_runs_through_pointers_and_a_copy_of_its_bytes_continues_as_it_does() {
+        let mut config = MaybeUninit::uninit();
+        let mut storage = [const { MaybeUninit::<PhaseLockController>::uninit() }; 2];
+        let [one, copy] = storage.each_mut().map(MaybeUninit::as_mut_ptr);
+        let mut bytes = [0_u8; 200];
+        let length = bytes.len();
+        let message = bytes.as_mut_ptr().cast::<c_char>();
+        let sample = |controller, n: u16| {
+            let response = 1e-3 * (0.05 * PhaseLockReal::from(n)).sin();
+            let reference = PhaseLockOptional { present: true, value: 0.1 * response };
+            let input = PhaseLockInput { response, reference, active: true };
+            let mut output = MaybeUninit::<PhaseLockOutput>::uninit();
+            // SAFETY: the controller has been initialised, and the call writes the output.
+            unsafe {
+                assert_eq!(
+                    phase_lock_sample(controller, &raw const input, output.as_mut_ptr()),
+                    SUCCESS
+                );
+                output.assume_init()
+            }
+        };
+        // SAFETY: the pointers are those of places of their types.
+        unsafe {
+            assert_eq!(
+                phase_lock_config_for_resonance(config.as_mut_ptr(), 55.0, 1e-4),
+                SUCCESS
+            );
+            let mut config = config.assume_init();
+            config.amplitude_max = PhaseLockOptional { present: true, value: 4e-4 };
+            assert_eq!(phase_lock_init(one, &raw const config, message, length), SUCCESS);
+            for n in 0..50 {
+                sample(one, n);
+            }
+            copy.copy_from_nonoverlapping(one, 1);
+            for n in 50..100 {
+                assert_eq!(sample(one, n), sample(copy, n));
+            }
+            let mut to = PhaseLockMove {
+                response: 1e-3,
+                duration: 1.0,
+                amplitude: 0.0,
+                omega: 0.0,
+                growth: 0.0,
+            };
+            assert_eq!(phase_lock_hold_response(one, &raw const to, message, length), SUCCESS);
+            to.response = -1.0;
+            assert_eq!(
+                phase_lock_hold_response(one, &raw const to, message, length),
+                INVALID_VALUE
+            );
+            assert_ne!(*message, 0);
+            assert_eq!(phase_lock_hold_drive(one), SUCCESS);
+            assert_eq!(phase_lock_retune(one, 2e-4, -1.0, null_mut(), 0), SUCCESS);
+            assert_eq!(phase_lock_reset(copy), SUCCESS);
+            config.sample_time = -1.0;
+            assert_eq!(phase_lock_init(copy, &raw const config, null_mut(), 0), INVALID_VALUE);
+            let fresh = sample(copy, 0);
+            assert_eq!((fresh.locked, fresh.fault), (false, PhaseLockFault::None));
+            assert_eq!(
+                phase_lock_init(null_mut(), &raw const config, message, length),
+                NULL_POINTER
+            );
+            assert_eq!(phase_lock_sample(null_mut(), null(), null_mut()), NULL_POINTER);
+            assert_eq!(phase_lock_hold_response(one, null(), message, length), NULL_POINTER);
+            assert_eq!(phase_lock_reset(null_mut()), NULL_POINTER);
+        }
     }
 }
