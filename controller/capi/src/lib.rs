@@ -288,7 +288,8 @@ mod tests {
         for detector in [-1, 0, 3, 4, 5, i32::MAX] {
             c.detector = detector;
             let refused = Config::try_from(&c).unwrap_err();
-            assert_eq!((refused.name, refused.value), ("detector", Some(detector.into())));
+            let value = refused.value.map(|value| value as i32);
+            assert_eq!((refused.name, value), ("detector", Some(detector)));
         }
     }
 

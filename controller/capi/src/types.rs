@@ -1,5 +1,7 @@
 //! The types of the header, and their conversions from the core and to it. The units are m, s, rad, rad/s.
 
+use core::mem::MaybeUninit;
+
 use phase_lock::{Fault, Input, LoopState, Move, Output, PhaseLock, State, Value};
 
 /// The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
@@ -14,7 +16,7 @@ pub type PhaseLockReal = f64;
 #[derive(Clone, Copy)]
 pub struct PhaseLockController {
     /// Opaque.
-    pub words: [u64; 384],
+    pub words: [MaybeUninit<u64>; 384],
 }
 
 /// Content of the storage.
