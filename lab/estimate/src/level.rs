@@ -75,7 +75,7 @@ const RING: f64 = 1.0;
 /// Passes after the first one, along the path without noise and rings that the one before found.
 const REPEATED: usize = 3;
 /// Standard deviations of normal noise that are exceeded with a probability of 1e-3.
-const SURE: f64 = 3.09;
+pub(crate) const SURE: f64 = 3.09;
 /// Places of Lambda0, of Lambda1 and of its product with a lag among the unknowns; a complex one has two.
 const FORCE: usize = 2;
 const SLOPES: usize = 4;

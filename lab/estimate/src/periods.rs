@@ -1,11 +1,12 @@
 //! The fundamental of a record, period by period.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{LN_2, PI, TAU};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use num_complex::Complex64;
 
 use crate::interpolation::{CubicSpline, curvature, gradient, unwrapped};
+use crate::level::SURE;
 
 /// What the periods of a record say. A complex amplitude z at the time t is the motion `Im(z exp(i omega t))`, with the frequency of the frame.
 #[derive(Debug, Clone, Default)]
@@ -81,6 +82,27 @@ impl Fit {
         // Median of the size of a normal variable; sum of the squares of the factors.
         (median / 0.6745).powi(2) / 924.0 * 2.0 / n as f64
     }
+}
+
+/// The second harmonic in a fit, if it contains one.
+fn second(coefficients: &DVector<f64>) -> Complex64 {
+    match coefficients.len() > 4 {
+        true => Complex64::new(coefficients[3], coefficients[4]),
+        false => Complex64::ZERO,
+    }
+}
+
+/// The variance of a component by what changes the second harmonics of the response from period to period, if that is more than chance makes of these
+/// variances: behind a filter differences of samples show little of the noise. (A base may be moved at once, and has the same filter.)
+fn changed(seconds: &[Complex64], variances: &[f64]) -> Option<f64> {
+    let mut changes: Vec<f64> = seconds.windows(2).map(|pair| (pair[1] - pair[0]).norm_sqr()).collect();
+    changes.sort_by(f64::total_cmp);
+    // The median of a sum of two squares, of twice the variance each.
+    let changed = changes[changes.len() / 2] / (4.0 * LN_2);
+    let white = variances.iter().sum::<f64>() / variances.len() as f64;
+    // Relative standard deviation of the median: of an exponential distribution 1/(ln 2 √n), and of neighbours that share a period √1.5 of that.
+    let chance = 1.5_f64.sqrt() / LN_2 / (changes.len() as f64).sqrt();
+    (changed > white * (1.0 + SURE * chance)).then_some(changed)
 }
 
 /// Moving average over `width` values, zero beyond the ends.
@@ -191,21 +213,28 @@ impl Periods {
             let t = k as f64 * sample_time;
             *value -= (envelope.at(t)[0] * Complex64::cis(omega * t)).im;
         }
+        let (mut seconds, mut whites) = (Vec::new(), Vec::new());
+        let is_displacement = readings[0] == response;
         for fit in &fits {
             let (coefficients, noise) = fit.of(&rest);
-            let second = if coefficients.len() > 4 {
-                Complex64::new(coefficients[3], coefficients[4])
-            } else {
-                Complex64::ZERO
-            };
-            periods.second.push(second);
+            periods.second.push(second(&coefficients));
+            seconds.push(match is_displacement {
+                true => second(&coefficients),
+                false => second(&fit.of(readings[0]).0),
+            });
             // What is left of an integral has not the noise of its sensor.
             let [white, of_base] = readings.map(|reading| fit.white(reading));
-            let is_displacement = readings[0] == response;
+            whites.push(white);
             periods
                 .noise
                 .push(if is_displacement { noise.min(white) } else { white });
             periods.base_noise.push(of_base);
+        }
+        if let Some(changed) = changed(&seconds, &periods.noise) {
+            let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+            let [of_response, of_base] = [mean(&periods.noise), mean(&whites)].map(|white| changed / white);
+            periods.noise.iter_mut().for_each(|one| *one *= of_response);
+            periods.base_noise.iter_mut().for_each(|one| *one *= of_base);
         }
         Some(periods)
     }

@@ -27,8 +27,10 @@ pub struct Cycle {
     pub base: Complex<f64>,
     /// Phase error, rad: response minus base minus target.
     pub phase_error: f64,
-    /// Variances of the fundamental of response and base by the noise of the sensors, m²: of each of its two components.
+    /// Variances of the fundamental of response and base by the noise of the sensors, m², if it is white: of each of its two components.
     pub noise: [f64; 2],
+    /// Second harmonics of response and base, scaled as their fundamentals are, m.
+    pub second: [Complex<f64>; 2],
     /// How often the sensor of the response differentiates the displacement.
     pub order: i32,
     /// Number of samples.
@@ -56,13 +58,14 @@ impl Bases {
         Self { harmonics, basis, drifting }
     }
 
-    /// The fundamental of a signal, and the variance of each of its components by noise. `coloured`: spectrum of the noise at the fundamental, over its
-    /// mean.
-    fn fundamental(&self, values: &DVector<f64>, coloured: f64) -> Option<(Complex<f64>, f64)> {
+    /// The first two harmonics of a signal, and the variance of each component of the first by noise. `coloured`: spectrum of the noise at the
+    /// fundamental, over its mean.
+    fn harmonics(&self, values: &DVector<f64>, coloured: f64) -> Option<([Complex<f64>; 2], f64)> {
         let fit = self.basis.fit(values)?;
         let residual = self.drifting.residual(values, &self.drifting.fit(values)?);
         let variance = residual.norm_squared() / (values.len() - self.drifting.terms()) as f64;
-        Some((fit.harmonic(1), variance * coloured * 2.0 / values.len() as f64))
+        let harmonics = [1, 2].map(|n| fit.harmonic(n));
+        Some((harmonics, variance * coloured * 2.0 / values.len() as f64))
     }
 }
 
@@ -99,11 +102,14 @@ impl Cycle {
             // Above many harmonics a sensor shows impacts rather than noise.
             let least = if bases.harmonics > HARMONICS { 0 } else { HARMONICS };
             let coloured = target.colour_of_fundamental(mean_omega, sample_time, least);
-            let (fundamental, variance) = bases.fundamental(&values, coloured)?;
+            let (harmonics, variance) = bases.harmonics(&values, coloured)?;
             let displacement = target.displacement(channel, mean_omega);
-            Some((fundamental * displacement, variance * displacement.norm_sqr()))
+            Some((
+                harmonics.map(|one| one * displacement),
+                variance * displacement.norm_sqr(),
+            ))
         };
-        let (response, noise) = fitted(0, |s| s.sensors.response)?;
+        let ([response, second], noise) = fitted(0, |s| s.sensors.response)?;
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
         // The amplitude commanded at a sample begins there; a sensor reads what the one before left.
         let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
@@ -114,16 +120,16 @@ impl Cycle {
             .harmonic(1);
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
-        let (base, base_noise) = if measured {
-            let (mut base, noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
+        let (base, base_second, base_noise) = if measured {
+            let ([mut base, second], noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
             match target.through_shaker {
                 true => commanded = base,
                 false => base = base * commanded / as_read,
             }
-            (base, noise)
+            (base, second, noise)
         } else {
             let base = mean(|s| s.command.drive.amplitude) * target.base_per_sample(mean_omega, sample_time);
-            (Complex::new(base, 0.0), 0.0)
+            (Complex::new(base, 0.0), Complex::ZERO, 0.0)
         };
         let phase_error = if measured {
             (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
@@ -149,6 +155,7 @@ impl Cycle {
             base,
             phase_error,
             noise: [noise, base_noise],
+            second: [second, base_second],
             order: target.measurands[0].order(),
             samples: samples.len(),
         })
@@ -165,6 +172,18 @@ impl Cycle {
             }
         }
         cycles
+    }
+
+    /// Standard deviations of each component of the fundamentals of response and base in some periods by the noise of the sensors, m: what the samples of
+    /// a period show, or behind a filter, which leaves little of that, what changes the second harmonics from period to period.
+    pub fn noise_of(cycles: &[Self]) -> [f64; 2] {
+        [0, 1].map(|n| {
+            let white = mean(cycles.iter().map(|cycle| cycle.noise[n]));
+            let changes = cycles
+                .windows(2)
+                .map(|pair| (pair[1].second[n] - pair[0].second[n]).norm_sqr());
+            white.max(mean(changes) / 4.0).sqrt()
+        })
     }
 
     /// Amplitude of the response, m.

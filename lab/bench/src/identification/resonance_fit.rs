@@ -72,7 +72,7 @@ impl ResonanceFit {
         let motion = motion(cycles);
         let response = mean(motion.iter().map(|cycle| cycle.amplitude));
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
-        let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
+        let [noise, base_noise] = Cycle::noise_of(cycles);
         let target = knowledge.numbers.definition.off_resonance();
         let drives = drives(cycles, &motion);
         // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).

@@ -123,6 +123,31 @@ fn tracked_from_sensors(
     compared(&mut rig, &scene, &plan)
 }
 
+/// A filter leaves little of the noise in a period but its first harmonics: as it is there, it is at the fundamental.
+#[test]
+fn behind_an_anti_alias_filter_that_the_scene_does_not_have_levels_settle_as_well() {
+    let few = "start.dq2=0 backbone.points=7 backbone.C_from=0.6 backbone.C_to=0.3";
+    for (snr, filter) in [(60, 10), (60, 20), (80, 5)] {
+        let scene = dimensionless(few);
+        let chain = format!("{few} chain.snr={snr} chain.filter={filter} chain.seed=7 chain.adc_bits=16");
+        let mut rig = SensorsOnly::around(Simulated::of(&dimensionless(&chain)).unwrap());
+        let plan = scene.plan();
+        let linear = check(&mut rig, &plan).unwrap().linear.expect("a linear response");
+        let plan = scene.plan_on(plan.knowledge.measured(linear.response));
+        let found = compared(&mut rig, &scene, &plan).unwrap();
+        let settled = found.points.iter().filter(|one| one.point.settled);
+        let off = |one: &TrackedPoint| {
+            let (at, exact) = (one.point.at, one.exact.unwrap());
+            let shared = found.u_linear.unwrap();
+            let sigma = exact.sigma.unwrap().abs() / at.u_sigma.hypot(shared[0]);
+            sigma.max(exact.g.unwrap().abs() / at.u_g.hypot(shared[1] * at.c))
+        };
+        let offs: Vec<f64> = settled.map(off).collect();
+        assert!(offs.len() >= 6, "{snr} dB, {filter}: {} settled", offs.len());
+        assert!(offs.iter().all(|off| *off < 4.0), "{snr} dB, {filter}: {offs:?}");
+    }
+}
+
 /// Below its fold a motion without impacts needs so little drive that noise hides the base.
 #[test]
 fn a_curve_that_ends_on_a_rig_without_reported_impacts_is_a_result_though_the_controller_stops_below() {
