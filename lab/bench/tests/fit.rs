@@ -573,7 +573,10 @@ fn a_recording_of_levels_at_any_phase_target_behind_a_filter_or_with_a_drift_giv
         ("levels", recording()),
         ("at -80 degrees", recorded(" chain.snr=60 controller.phase_target=-80")),
         ("behind a filter", recorded(" chain.snr=60 chain.filter=10")),
-        ("behind a filter that leaves little noise", recorded(" chain.snr=60 chain.filter=4")),
+        (
+            "behind a filter that leaves little noise",
+            recorded(" chain.snr=60 chain.filter=4"),
+        ),
         ("with a drift", drifting),
     ] {
         let off = of_ideal(&of_recording(one, &scene, &ONLY_IDEAL));

@@ -7,7 +7,7 @@
 //! A hypothesis is excluded where a channel rejects it, or where its chi-square exceeds the smallest one by more than chance allows. What remains is
 //! possible, and the range of a parameter is that over what remains.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use lovines::Parameters;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -378,9 +378,9 @@ impl Data {
             return Err(FitError::TooFew(self.points.len()));
         }
         for (n, point) in self.points.iter().enumerate() {
-            let estimates = [point.response, point.omega, point.drive];
-            for (what, Estimate { value, uncertainty }) in ["response", "frequency", "drive"].into_iter().zip(estimates)
-            {
+            let estimates = [point.response, point.omega.scaled(1.0 / TAU), point.drive];
+            let names = ["response, m,", "frequency, Hz,", "drive"];
+            for (what, Estimate { value, uncertainty }) in names.into_iter().zip(estimates) {
                 let is_positive = |number: f64| number > 0.0 && number.is_finite();
                 if !(is_positive(value) && is_positive(uncertainty)) {
                     return Err(FitError::NotPositive { number: n + 1, what, value, uncertainty });

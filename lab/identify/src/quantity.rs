@@ -223,6 +223,13 @@ impl FromStr for Known {
         if uncertainty < 0.0 || (value < 0.0 && !may_be_negative) || (value == 0.0 && !may_be_0) {
             return Err(format!("`{text}`: the value must be positive, and its uncertainty positive or 0").into());
         }
+        let most = match quantity {
+            Some(Quantity::R | Quantity::Zeta) => 1.0,
+            _ => f64::INFINITY,
+        };
+        if value > most {
+            return Err(format!("`{text}`: the value may be at most {most}").into());
+        }
         let estimate = Estimate { value, uncertainty };
         match (quantity, hypothesis) {
             (Some(quantity), _) => Ok(Self::Value { quantity, estimate }),

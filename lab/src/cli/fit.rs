@@ -183,7 +183,13 @@ fn gathered(
         ..Measurements::default()
     };
     let (mut skipped, mut notes) = (0, Vec::new());
-    for path in &arguments.points {
+    for (n, path) in arguments.points.iter().enumerate() {
+        if arguments.points[..n].contains(path) {
+            return Err(Failure::input(format!(
+                "{} is given twice: its data would count twice, and the uncertainties be too small",
+                path.display()
+            )));
+        }
         let reading = Reading {
             columns: &arguments.column,
             phase: scene.definition().phase,
@@ -252,6 +258,12 @@ pub(super) fn run(
     writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
     let Gathered { measured, skipped, notes } = gathered(arguments, &scene, read)?;
     if measured.points.is_empty() && measured.recordings.is_empty() && skipped == 0 && !notes.is_empty() {
+        if let Some(path) = arguments.out.as_ref().or(arguments.figure.as_ref()) {
+            return Err(Failure::input(format!(
+                "{}: linear decays alone have no fit to write; add points or a recording with impacts",
+                path.display()
+            )));
+        }
         let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines(&notes))?;
         return Ok(Results::new(text, Written::default));
     }

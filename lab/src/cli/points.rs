@@ -163,10 +163,15 @@ pub(super) fn measurement(
         Source::Channels(contents) => contents,
         Source::Json(bytes) => return of_json(path, &bytes, reading),
     };
-    let is_named = selection.response.is_some() || selection.drive.is_some();
-    let has_points = !reading.columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| contents.unit(name).is_some());
+    let has = |names: &[&str]| names.iter().all(|name| contents.unit(name).is_some());
+    let (own_points, own_recording) = (has(&OWN), has(&["response", "omega", "E"]));
+    // Channels that a file of `vines` does not have are named for the files of others beside it.
+    let mut named = [&selection.response, &selection.drive].into_iter().flatten();
+    let is_of_it = |text: &String| !(own_points || own_recording) || has(&[text.split(':').next().unwrap_or(text)]);
+    let is_named = named.any(is_of_it);
+    let has_points = !reading.columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| has(&[name]));
     if has_points && !is_named {
-        if !OWN.iter().all(|name| contents.unit(name).is_some()) {
+        if !own_points {
             requires_sensor(&contents.origin, reading.scene).map_err(refused)?;
         }
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
@@ -182,6 +187,12 @@ pub(super) fn measurement(
              NAME:UNIT, or the columns of points with --column"
         )))));
     }
+    let of_itself = Selection { response: None, drive: None, ..selection.clone() };
+    let selection = if own_recording && !is_named {
+        &of_itself
+    } else {
+        selection
+    };
     Ok(Measurement::Recording(
         Recording::of(&contents, selection).map_err(refused)?,
     ))

@@ -569,7 +569,7 @@ fn refusal(line: &str) -> String {
 }
 
 #[test]
-#[ignore = "a refusal gives the advice of the search and that of the exact orbits, until the one estimator replaces the search"]
+#[ignore = "open: a refusal gives the advice of the search and that of the exact orbits"]
 fn a_refusal_gives_one_advice_and_it_follows_from_the_exact_orbits() {
     // No time makes an orbit stable: they are stable for G from 0.959 to 1.414.
     for drive in ["0.03", "0.3"] {
@@ -595,7 +595,7 @@ fn a_refusal_gives_one_advice_and_it_follows_from_the_exact_orbits() {
 }
 
 #[test]
-#[ignore = "the plausibility of a response to a weak drive comes with the noise floor and the one estimator"]
+#[ignore = "open: the controller takes the response to a weak drive beside a moving particle for implausible"]
 fn a_drive_that_is_weak_beside_the_start_of_the_particle_is_no_failed_sensor() {
     for drive in ["0.001", "0.02"] {
         let said = refusal(&format!("--set excitation.G={drive}"));

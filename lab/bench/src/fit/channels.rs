@@ -95,6 +95,11 @@ impl File<'_> {
             let rate = selection.rate.unwrap_or_default();
             return Err(self.refused(&format!(": the rate is {rate} samples a second; it must be above 0")));
         }
+        if let Some(late) = selection.late.filter(|late| !late.is_finite()) {
+            return Err(self.refused(&format!(
+                ": the base is {late} s later; this must be a finite time in s"
+            )));
+        }
         let response = selection.response.as_deref().unwrap_or("response");
         let (mut notes, mut units) = (Vec::new(), Vec::new());
         let motions = Measurand::ALL.map(Measurand::unit);

@@ -384,7 +384,7 @@ impl Recording {
         if fed.im > fed.re.abs() {
             return Err(RecordingError(format!(
                 "{origin}: the response (channel `{response}`) leads the base (channel `{drive}`) by about a quarter of a period, where it lags on \
-                 every passive rig: one of the channels has the wrong sign; give it with a negative factor, for instance --drive {drive}:-1"
+                 every passive rig: one of the channels has the wrong sign; give it a unit with a minus, for instance --drive {drive}:-1mm"
             )));
         }
         Ok(())
