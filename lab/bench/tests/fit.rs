@@ -758,6 +758,25 @@ fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_
             assert!(estimate.uncertainty < 0.01 * truth, "{decay}");
         }
     }
+    // The frequency of a suspension that hardens depends on the amplitude: at a small one it is within the uncertainty.
+    let hardening = |n: i32| {
+        let time = dt * f64::from(n);
+        let decay = (-zeta * omega0 * time).exp();
+        let moved = 2e-3 / (2.0 * zeta) * (1.0 - decay * decay);
+        1e-3 * decay * ((1.0 - zeta * zeta).sqrt() * omega0 * time + moved).sin()
+    };
+    let record = Recording {
+        sample_time: dt,
+        response: (0..6000).map(|n| hardening(n) + 1e-7 * noise()).collect(),
+        drive: vec![0.0; 6000],
+        channels: ["y".into(), String::new()],
+        ..recording()
+    };
+    let decay = record.linear_decay(&scene.knowledge()).unwrap().unwrap();
+    assert!(
+        (decay.omega.value - omega0).abs() < 2.0 * decay.omega.uncertainty,
+        "{decay}"
+    );
     // The mean square of 40 normal values has a standard deviation of 0.22.
     let square = mean_square(pulls.iter().copied());
     assert!((0.5..1.5).contains(&square), "{square}");

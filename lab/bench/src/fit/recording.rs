@@ -207,21 +207,25 @@ impl Recording {
                  it connected?"
             )));
         };
-        let pieces = values.chunks_exact(FEWEST_OF_DECAY * period);
+        let pieces: Vec<_> = values.chunks_exact(FEWEST_OF_DECAY * period).map(fitted).collect();
         let significant = (SIGNIFICANT.powi(2) + 2.0 * (pieces.len() as f64).ln()).sqrt();
-        let is_another = |values: &[f64]| {
-            let (of_piece, u) = fitted(values);
+        let is_another = |(of_piece, u): &(Complex64, f64)| {
             let is_alike = (1.0 / DAMPING_RATIO..DAMPING_RATIO).contains(&(of_piece.re / pole.re));
             !is_alike && (of_piece.re - pole.re).abs() > significant * u
         };
-        if pieces.into_iter().any(is_another) {
+        if pieces.iter().any(is_another) {
             return Ok(None);
         }
-        let estimate = |value: f64| Estimate {
+        // A frequency that changes with the amplitude is as uncertain as it changes.
+        let changes = pieces
+            .iter()
+            .map(|(of_piece, u)| (of_piece.im - pole.im).abs() - significant * u);
+        let changed = changes.fold(0.0, f64::max);
+        let estimate = |value: f64, u: f64| Estimate {
             value: value / self.sample_time,
             uncertainty: u / self.sample_time,
         };
-        let [omega, rate] = [pole.norm(), -pole.re].map(estimate);
+        let (omega, rate) = (estimate(pole.norm(), u.hypot(changed)), estimate(-pole.re, u));
         Ok(Some(LinearDecay { omega, zeta: rate.scaled(1.0 / omega.value) }))
     }
 

@@ -175,14 +175,15 @@ impl Cycle {
     }
 
     /// Standard deviations of each component of the fundamentals of response and base in some periods by the noise of the sensors, m: what the samples of
-    /// a period show, or behind a filter, which leaves little of that, what changes the second harmonics from period to period.
-    pub fn noise_of(cycles: &[Self]) -> [f64; 2] {
+    /// a period show, or behind a filter, which leaves little of that, what changes the second harmonics of a motion that is held.
+    pub fn noise_of(cycles: &[Self], is_held: bool) -> [f64; 2] {
         [0, 1].map(|n| {
             let white = mean(cycles.iter().map(|cycle| cycle.noise[n]));
             let changes = cycles
                 .windows(2)
                 .map(|pair| (pair[1].second[n] - pair[0].second[n]).norm_sqr());
-            white.max(mean(changes) / 4.0).sqrt()
+            let changed = if is_held { mean(changes) / 4.0 } else { 0.0 };
+            white.max(changed).sqrt()
         })
     }
 

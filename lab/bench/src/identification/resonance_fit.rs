@@ -72,7 +72,7 @@ impl ResonanceFit {
         let motion = motion(cycles);
         let response = mean(motion.iter().map(|cycle| cycle.amplitude));
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
-        let [noise, base_noise] = Cycle::noise_of(cycles);
+        let [noise, base_noise] = Cycle::noise_of(cycles, is_held);
         let target = knowledge.numbers.definition.off_resonance();
         let drives = drives(cycles, &motion);
         // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
