@@ -70,7 +70,7 @@ pub fn components() -> [Component; 2] {
 /// The plant of a scene and the controller.
 ///
 /// # Errors
-/// As [`structure::component`].
+/// A description that is not XML, and values that the plant refuses.
 pub fn components_of(scene: &Scene) -> Result<[Component; 2], PackError> {
     let [oscillator, controller] = components();
     let plant = match &scene.structure {

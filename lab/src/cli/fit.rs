@@ -19,7 +19,7 @@ use vines::{ArgumentError, cells};
 use super::failure::Failure;
 use super::options::{SceneArguments, positive};
 use super::output::{Results, Written, output, progress_bar, writable};
-use super::points::{Column, Measurement, Reading, Source, measurement};
+use super::points::{Column, Measurement, Reading, Source, is_own, measurement};
 use super::summary::with_unit;
 
 const HELP: &str = "\
@@ -183,6 +183,7 @@ fn gathered(
         ..Measurements::default()
     };
     let (mut skipped, mut notes) = (0, Vec::new());
+    let mut sources = Vec::new();
     for (n, path) in arguments.points.iter().enumerate() {
         if arguments.points[..n].contains(path) {
             return Err(Failure::input(format!(
@@ -190,12 +191,17 @@ fn gathered(
                 path.display()
             )));
         }
-        let reading = Reading {
-            columns: &arguments.column,
-            phase: scene.definition().phase,
-            scene,
-        };
-        let source = read(path).map_err(Failure::input)?;
+        sources.push((path, read(path).map_err(Failure::input)?));
+    }
+    let reading = Reading {
+        columns: &arguments.column,
+        phase: scene.definition().phase,
+        scene,
+        beside_others: sources
+            .iter()
+            .any(|(_, source)| matches!(source, Source::Channels(contents) if !is_own(contents))),
+    };
+    for (path, source) in sources {
         match measurement(path, source, reading, &selection).map_err(Failure::input)? {
             Measurement::Points(points, left_out, linear) => {
                 measured.points.extend(points);

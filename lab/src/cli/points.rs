@@ -146,6 +146,14 @@ pub(super) struct Reading<'a> {
     pub phase: f64,
     /// The scene, for the units of the channels.
     pub scene: &'a Scene,
+    /// Whether files that `vines` has not written are read as well.
+    pub beside_others: bool,
+}
+
+/// Whether `vines` wrote a file: a table of points, or a recording.
+pub(super) fn is_own(contents: &Contents) -> bool {
+    let has = |names: &[&str]| names.iter().all(|name| contents.unit(name).is_some());
+    has(&OWN) || has(&["response", "omega", "E"])
 }
 
 /// What is measured in a file: points if it has one of their columns or `reading` names some, otherwise a recording.
@@ -164,11 +172,11 @@ pub(super) fn measurement(
         Source::Json(bytes) => return of_json(path, &bytes, reading),
     };
     let has = |names: &[&str]| names.iter().all(|name| contents.unit(name).is_some());
-    let (own_points, own_recording) = (has(&OWN), has(&["response", "omega", "E"]));
+    let own_points = has(&OWN);
     // Channels that a file of `vines` does not have are named for the files of others beside it.
+    let is_beside = reading.beside_others && is_own(&contents);
     let mut named = [&selection.response, &selection.drive].into_iter().flatten();
-    let is_of_it = |text: &String| !(own_points || own_recording) || has(&[text.split(':').next().unwrap_or(text)]);
-    let is_named = named.any(is_of_it);
+    let is_named = named.any(|text| !is_beside || has(&[text.split(':').next().unwrap_or(text)]));
     let has_points = !reading.columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| has(&[name]));
     if has_points && !is_named {
         if !own_points {
@@ -188,11 +196,7 @@ pub(super) fn measurement(
         )))));
     }
     let of_itself = Selection { response: None, drive: None, ..selection.clone() };
-    let selection = if own_recording && !is_named {
-        &of_itself
-    } else {
-        selection
-    };
+    let selection = if is_beside && !is_named { &of_itself } else { selection };
     Ok(Measurement::Recording(
         Recording::of(&contents, selection).map_err(refused)?,
     ))
@@ -327,7 +331,7 @@ fn point<'a>(
     path: &Path,
     number: usize,
     row: &Row,
-    Reading { columns, phase, scene }: Reading<'_>,
+    Reading { columns, phase, scene, .. }: Reading<'_>,
     stated: &impl Fn(&str) -> &'a str,
 ) -> Result<MeasuredPoint, ArgumentError> {
     let units = scene.units();
