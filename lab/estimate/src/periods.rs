@@ -84,6 +84,10 @@ impl Fit {
     }
 }
 
+fn mean(of: &[f64]) -> f64 {
+    of.iter().sum::<f64>() / of.len() as f64
+}
+
 /// The second harmonic in a fit, if it contains one.
 fn second(coefficients: &DVector<f64>) -> Complex64 {
     match coefficients.len() > 4 {
@@ -99,7 +103,7 @@ fn changed(seconds: &[Complex64], variances: &[f64]) -> Option<f64> {
     changes.sort_by(f64::total_cmp);
     // The median of a sum of two squares, of twice the variance each.
     let changed = changes[changes.len() / 2] / (4.0 * LN_2);
-    let white = variances.iter().sum::<f64>() / variances.len() as f64;
+    let white = mean(variances);
     // Relative standard deviation of the median: of an exponential distribution 1/(ln 2 √n), and of neighbours that share a period √1.5 of that.
     let chance = 1.5_f64.sqrt() / LN_2 / (changes.len() as f64).sqrt();
     (changed > white * (1.0 + SURE * chance)).then_some(changed)
@@ -231,7 +235,6 @@ impl Periods {
             periods.base_noise.push(of_base);
         }
         if let Some(changed) = changed(&seconds, &periods.noise) {
-            let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
             let [of_response, of_base] = [mean(&periods.noise), mean(&whites)].map(|white| changed / white);
             periods.noise.iter_mut().for_each(|one| *one *= of_response);
             periods.base_noise.iter_mut().for_each(|one| *one *= of_base);

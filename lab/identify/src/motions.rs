@@ -119,7 +119,7 @@ impl Motions<'_> {
         let at = [at[0] / numbers.b, numbers.sigma(at[1])];
         let conditions = [Condition::Phase(phase), Condition::Across { phase, at, normal }];
         let motion = periodic_motion(&self.plant, definition, near, conditions).ok()?;
-        // As in closed form: far above, the symmetric motion is so unstable that nobody has measured it.
+        // As in closed form: far above its loss of stability no rig keeps the symmetric motion.
         let is_faster = motion.state.dq2.abs() > FASTEST * self.plant.half_width * motion.omega;
         (!is_faster).then_some(motion)
     }
