@@ -25,7 +25,8 @@ pub struct Curve {
     pub coefficients: Vec<Complex64>,
     /// Covariance of their real and imaginary parts.
     pub covariance: DMatrix<f64>,
-    /// Rows, of variance 1, of what the record says of the coefficients without any prior.
+    /// Rows, of variance 1, of what the record says, without any prior, of the coefficients and of the share by which the base moves more than its
+    /// reference reads. The curve is that of a reference that reads what moves.
     pub information: DMatrix<f64>,
     /// The measured values of these rows.
     pub expected: DVector<f64>,
@@ -107,11 +108,12 @@ impl Curve {
     }
 
     /// The curve as it is stated: beside noise, drive and amplitude have a relative standard uncertainty of `share`, and the frequency that share of the
-    /// half-power bandwidth. The errors of the functions are independent. `None` where rounding leaves no covariance.
+    /// half-power bandwidth. The errors of the functions are independent. The gain of the reference has that of the drive. `None` where rounding leaves no covariance.
     pub fn resolved(mut self, share: f64) -> Option<Self> {
         // The amplitude at which each function counts most.
         let amplitudes: Vec<f64> = self.basis.spread(self.basis.size).map(f64::exp).collect();
         let at = self.at(&amplitudes);
+        let size = self.covariance.nrows();
         let variance = |n: usize| {
             let (amplitude, drive) = (amplitudes[n / 2], at.drive[n / 2]);
             let of = match n % 2 {
@@ -121,8 +123,9 @@ impl Curve {
             };
             (share * of).powi(2)
         };
-        let floor = DMatrix::from_diagonal(&DVector::from_fn(self.covariance.nrows(), |n, _| variance(n)));
-        self.covariance += &floor;
+        let of_gain = |n: usize| if n == size { share * share } else { variance(n) };
+        let floor = DMatrix::from_diagonal(&DVector::from_fn(size + 1, |n, _| of_gain(n)));
+        self.covariance += floor.view((0, 0), (size, size));
         let rows = self.information.nrows();
         let of_rows = DMatrix::identity(rows, rows) + &self.information * floor * self.information.transpose();
         let whitened = of_rows.cholesky()?.l();
@@ -131,9 +134,9 @@ impl Curve {
         Some(self)
     }
 
-    /// What the record contradicts in a backbone: residuals of variance 1. Beyond its ends the backbone's force continues as it ends. `None` for
-    /// fewer than four points, and for points that do not rise.
-    pub fn residuals(&self, backbone: &[[f64; 3]]) -> Option<DVector<f64>> {
+    /// What the record contradicts in a backbone, as a reference reads it that reads a share `gain` too much: residuals of variance 1. Beyond its ends
+    /// the backbone's force continues as it ends. `None` for fewer than four points, and for points that do not rise.
+    pub fn residuals(&self, backbone: &[[f64; 3]], gain: f64) -> Option<DVector<f64>> {
         let logarithms: Vec<f64> = backbone.iter().map(|point| point[0].ln()).collect();
         let (first, last) = (*logarithms.first()?, *logarithms.last()?);
         // No number rises.
@@ -144,13 +147,15 @@ impl Curve {
             logarithms,
             backbone
                 .iter()
-                .map(|point| self.linear.force_at_resonance(*point, self.power))
+                .map(|[amplitude, drive, omega]| [*amplitude, drive / (1.0 + gain), *omega])
+                .map(|point| self.linear.force_at_resonance(point, self.power))
                 .collect(),
         );
         let at = |a: f64| (a, spline.at(a.clamp(first, last))[0]);
         let force: Vec<(f64, Complex64)> = self.basis.spread(POINTS * self.basis.size).map(at).collect();
         let coefficients = Self::coefficients(&self.basis, &force)?;
-        let parts: Vec<f64> = coefficients.iter().flat_map(|c| [c.re, c.im]).collect();
+        let moves = (1.0 + gain).recip() - 1.0;
+        let parts: Vec<f64> = coefficients.iter().flat_map(|c| [c.re, c.im]).chain([moves]).collect();
         Some(&self.information * DVector::from_vec(parts) - &self.expected)
     }
 }

@@ -17,7 +17,9 @@ const FUNCTIONS: usize = 23;
 const U_LAG: f64 = 0.02;
 /// Share of a sample through which a base holds its amplitude, and its standard uncertainty: all of it in a simulation, none on a smooth base.
 const HELD: (f64, f64) = (0.5, 0.5);
-/// Information on u at the start: none, but for rounding.
+/// Standard uncertainty of the gain of a reference that was calibrated as usual, relative.
+pub const CALIBRATION: f64 = 0.01;
+/// Information on u at the start: none, but for rounding. Its inverse is that on what is exact.
 const START_INFORMATION: f64 = 1e-30;
 /// Uncertainty of the curvature of an element's own force, relative: what the uncertainties of a drawing move it by.
 const SHAPE: f64 = 0.25;
@@ -47,10 +49,12 @@ pub struct Estimate<'a> {
     own: Vec<Complex64>,
     /// Smallest roughness of the deviation, over the scale.
     least: f64,
+    /// Whether the reference reads the motion of the base exactly.
+    is_calibrated: bool,
     columns: Columns,
 }
 
-/// The unknowns: spline, lag, u at the start, and the share of a sample through which the base holds its amplitude, real and imaginary part of each.
+/// The unknowns: spline, share by which the base moves more than the reference reads, lag, u at the start, and the share of a sample through which the base holds its amplitude, real and imaginary part of each.
 pub struct Solution {
     /// Twice the negative logarithm of the likelihood, without constants.
     pub deviance: f64,
@@ -115,6 +119,7 @@ impl<'a> Estimate<'a> {
             hyper,
             own,
             least,
+            is_calibrated: false,
             columns,
         })
     }
@@ -124,12 +129,10 @@ impl<'a> Estimate<'a> {
         self.own.fill(Complex64::ZERO);
         self.columns.feedback.iter_mut().for_each(|one| one.fill(0.0));
         for direct in &mut self.columns.direct {
-            direct
-                .iter_mut()
-                .last()
-                .into_iter()
-                .for_each(|held| *held = Complex64::ZERO);
+            direct[1 + FUNCTIONS] = Complex64::ZERO;
+            direct[4 + FUNCTIONS] = Complex64::ZERO;
         }
+        self.is_calibrated = true;
         self
     }
 
@@ -146,15 +149,30 @@ impl<'a> Estimate<'a> {
         let n = products.nrows() - 1;
         let information = products.view((1, 1), (n, n)).into_owned();
         let right = products.view((1, 0), (n, 1)).into_owned();
-        let m = self.basis.size;
+        // The first of the unknowns that are not of the spline.
+        let first = 2 * self.basis.size;
         let (mut normal, mut known) = (information.clone(), right.column(0).into_owned());
         for (part, change) in [1.0 - self.lag.re, -self.lag.im].into_iter().enumerate() {
-            normal[(2 * m + part, 2 * m + part)] += U_LAG.powi(-2);
-            known[2 * m + part] += change * U_LAG.powi(-2);
-            normal[(2 * m + 2 + part, 2 * m + 2 + part)] += START_INFORMATION;
+            let is_free = part == 0 && !self.is_calibrated;
             // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
-            normal[(2 * m + 4 + part, 2 * m + 4 + part)] += HELD.1.powi(-2);
-            known[2 * m + 4 + part] += if part == 0 { HELD.0 } else { 0.0 } * HELD.1.powi(-2);
+            let priors = [
+                (
+                    0.0,
+                    if is_free {
+                        CALIBRATION.powi(-2)
+                    } else {
+                        START_INFORMATION.recip()
+                    },
+                ),
+                (change, U_LAG.powi(-2)),
+                (0.0, START_INFORMATION),
+                (if part == 0 { HELD.0 } else { 0.0 }, HELD.1.powi(-2)),
+            ];
+            for (n, (expected, information)) in priors.into_iter().enumerate() {
+                let place = first + 2 * n + part;
+                normal[(place, place)] += information;
+                known[place] += expected * information;
+            }
         }
         let right = known.clone();
         let constant = self.expect(&mut normal, &mut known, hyper[1]);
@@ -164,7 +182,7 @@ impl<'a> Estimate<'a> {
             + normal.ln_determinant()
             + (HELD.0 / HELD.1).powi(2)
             + 4.0 * HELD.1.ln()
-            + 4.0 * (m - 2) as f64 * hyper[1].ln();
+            + 4.0 * (self.basis.size - 2) as f64 * hyper[1].ln();
         let innovations = white.row(0).transpose() - white.rows(1, n).tr_mul(&unknowns);
         let innovations = innovations.as_slice().to_vec();
         deviance.is_finite().then_some(Solution {
@@ -216,6 +234,7 @@ impl<'a> Estimate<'a> {
                 ([0.7, 0.33, 0.07], 40)
             };
             self.hyper = inside(&simplex(self.hyper.map(f64::ln), steps, cost, [0.02, 0.05], most));
+            self.is_calibrated = round + 1 == PATH_ROUNDS;
             let solution = self.solve(self.hyper)?;
             let unknowns = complex(&solution.unknowns);
             let (m, lag) = (self.basis.size, self.lag);
@@ -225,7 +244,7 @@ impl<'a> Estimate<'a> {
             }
             let path = self.smooth(self.hyper, &solution);
             // At most a fifth at a time: the force is linear in the factor for small changes only.
-            self.lag = lag + unknowns[m] / (unknowns[m].norm() / 0.2).max(1.0);
+            self.lag = lag + unknowns[m + 1] / (unknowns[m + 1].norm() / 0.2).max(1.0);
             let force = Force {
                 element: self.element,
                 basis: self.basis,
@@ -248,7 +267,7 @@ impl<'a> Estimate<'a> {
     pub fn curve(&self, solution: &Solution) -> Option<Curve> {
         let n = 2 * self.basis.size;
         let covariance = solution.normal.inverse().view((0, 0), (n, n)).into_owned();
-        let (information, expected) = solution.of_the_force(n)?;
+        let (information, expected) = solution.of_the_first(n + 1)?;
         Some(Curve {
             linear: self.record.linear,
             power: self.record.power,
@@ -264,7 +283,7 @@ impl<'a> Estimate<'a> {
 impl Solution {
     /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, and their values: the equations, without the
     /// other unknowns.
-    fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    fn of_the_first(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let (all, right) = &self.information;
         let rest = all.nrows() - n;
         // The others keep their prior, which the equations with it contain.
