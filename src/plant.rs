@@ -499,10 +499,52 @@ impl<'de> serde::Deserialize<'de> for Plant {
 #[cfg(test)]
 mod tests {
     use crate::plant::Saved;
-    use crate::{Drive, Parameters, Plant, State};
+    use crate::{Cavity, Drive, Parameters, Plant, State};
+    use proptest::prelude::*;
 
     /// A start near the 1:1 motion of the default rig.
     const LOCK: State = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Steps of few lengths, so that all caches are used, under a drive that stays, changes or has a slope, in an ideal or a real cavity.
+        #[test]
+        fn a_workspace_dropped_at_any_time_changes_no_bit(
+            steps in prop::collection::vec((0usize..5, any::<bool>()), 300),
+            wobble in prop_oneof![Just(0.0), 1e-6..1e-2f64],
+            slope in prop_oneof![3 => Just(0.0), 1 => 0.0..1e-3f64],
+            g in 0.5..3.0f64,
+            real in any::<bool>(),
+            (mu, tilt, scatter) in (0.0..0.003f64, -0.002..0.002f64, 0.0..0.1f64),
+        ) {
+            let mut parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+            if real {
+                parameters.cavity = Cavity { kinetic_friction: mu, tilt, scatter, ..Cavity::IDEAL };
+            }
+            let mut plant = Plant::new(parameters, LOCK).unwrap();
+            let mut other = plant;
+            let mut n = 0;
+            for (length, drop) in steps {
+                let step = [0.063, 0.3, 1.7, 6.3, 6.344][length];
+                // Equal steps in a row, as masters make them.
+                for _ in 0..3 {
+                    n += 1;
+                    let omega = 0.990_417 + wobble * f64::from(n % 7);
+                    let drive = Drive { signal: [0.0, slope, 0.0, 0.0], ..Drive::harmonic(0.0084 * g, omega) };
+                    if drop {
+                        // All that is not state is lost on the way.
+                        let saved = postcard::to_stdvec(&other).unwrap();
+                        other = postcard::from_bytes(&saved).unwrap();
+                    }
+                    prop_assert_eq!(plant.advance(drive, step), other.advance(drive, step));
+                    prop_assert_eq!(plant.state(), other.state(), "step {}", n);
+                }
+            }
+            prop_assert!(plant.totals().impacts > 10);
+            prop_assert_eq!(plant.totals(), other.totals());
+        }
+    }
 
     #[test]
     fn plants_that_take_turns_in_one_workspace_have_the_bits_of_plants_of_their_own() {
