@@ -1185,41 +1185,6 @@ mod tests {
     }
 
     #[test]
-    fn the_way_to_the_sections_in_contact_and_back_changes_nothing() {
-        for coupling in [0.0, 0.1, 3.0] {
-            let (sections, expansion) = modal(coupling, Excitation::Base).modal.sections(0.5).unwrap();
-            let there_and_back = &expansion.to_modal * &expansion.to_sections;
-            assert!(
-                (there_and_back - DMatrix::<f64>::identity(6, 6)).amax() < 1e-13,
-                "{coupling}"
-            );
-            let drive = &expansion.to_modal * &expansion.drive_to_sections + &expansion.drive_to_modal;
-            assert!(drive.amax() < 1e-13, "{coupling}: {drive}");
-            assert_eq!(sections.len(), 3);
-        }
-    }
-
-    #[test]
-    fn one_mode_with_the_particle_on_its_wall_is_an_oscillator_with_both_masses() {
-        let (primary, m, k, c) = (3.807, 0.032, 11_680.0, 2.53);
-        let omega = f64::sqrt(k / primary);
-        let mode = Mode {
-            omega,
-            zeta: c / (2.0 * primary * omega),
-            cavity: 1.0 / f64::sqrt(primary),
-            drive: f64::sqrt(primary),
-        };
-        let host = Host::from_modes(Excitation::Base, &[mode]).unwrap();
-        let (sections, _) = host.modal.sections(m).unwrap();
-        let both = Oscillator::new(primary + m, k, c);
-        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 4e-15, "{a} {b}");
-        near(sections[0].oscillator.omega0_squared, both.omega0_squared);
-        near(sections[0].oscillator.delta, both.delta);
-        near(mobility(&sections), 1.0 / (primary + m));
-        near(host.mobility(), 1.0 / primary);
-    }
-
-    #[test]
     fn what_is_wrong_with_a_structure_is_said_in_one_sentence() {
         let mode = Mode { omega: 1.0, zeta: 0.01, cavity: 1.0, drive: 1.0 };
         let refused = |modes: &[Mode]| Host::from_modes(Excitation::Force, modes).unwrap_err().to_string();

@@ -76,26 +76,3 @@ impl DriveState {
 fn approach(from: Real, to: Real, step: Real) -> Real {
     real::limited(to, from - step, from + step)
 }
-
-#[cfg(test)]
-#[cfg(not(feature = "f32"))]
-mod tests {
-    use super::*;
-
-    const DRIVE: DriveGenerator = DriveGenerator {
-        amplitude_max: 2.0,
-        ramp_step: 0.3,
-        release_step: f64::INFINITY,
-        control_step: 0.1,
-    };
-
-    #[test]
-    fn the_control_stays_within_its_limit_if_the_base_does_not_move() {
-        let mut state = DriveState::default();
-        for _ in 0..1000 {
-            DRIVE.ramp(&mut state, 1.0);
-            DRIVE.control(&mut state, 1.0, 0.0);
-            assert!(state.amplitude <= 2.0);
-        }
-    }
-}

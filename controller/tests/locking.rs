@@ -186,6 +186,8 @@ fn an_invalid_configuration_is_refused_by_name() {
         ("phase_target", Config { phase_target: 4.0, ..config() }),
         ("sample_time", Config { sample_time: 0.05, bandwidth: 0.1, ..config() }),
         ("delay", Config { delay: f64::INFINITY, ..config() }),
+        // The number for an absent option.
+        ("response_max", Config { response_max: Some(-1.0), ..config() }),
     ] {
         assert!(refusal(bad).starts_with(name), "{}", refusal(bad));
     }

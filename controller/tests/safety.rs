@@ -34,16 +34,6 @@ fn never_locks_on_a_zero_signal_on_noise_or_without_a_drive() {
 }
 
 #[test]
-fn before_the_first_sample_there_is_the_start_frequency_and_no_drive() {
-    let output = config().build().expect("a valid configuration").idle();
-    assert_eq!((output.omega, output.frequency), (OMEGA_0, OMEGA_0));
-    assert_eq!(
-        (output.amplitude, output.drive, output.state),
-        (0.0, 0.0, LoopState::Idle)
-    );
-}
-
-#[test]
 fn an_invalid_reading_ramps_the_drive_down_and_latches() {
     // Also while the response is controlled.
     let benches = [Bench::locked, holding].map(|bench| bench(Config { ramp_rate: Some(AMPLITUDE), ..config() }));

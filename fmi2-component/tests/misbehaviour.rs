@@ -1,16 +1,13 @@
-//! Guards the shell against a component that panics and refuses at every opportunity, and a logger that calls back; and the adoption of
-//! another model. Its table is written by hand.
+//! Guards the shell against a component that panics and refuses at every opportunity, and a logger that calls back. Its table is written by
+//! hand.
 
-use std::ffi::{CString, c_char, c_void};
-use std::ops::Range;
+use std::ffi::{c_char, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 use fmi2_boundary::{Functions, Master, call, callbacks, functions_of, refused};
 use fmi2_component::abi::CallbackFunctions;
-use fmi2_component::{
-    Causality, Component, Initial, Key, Log, Model, Refusal, Resources, Status, Variability, Variable, foreign, guid_of,
-};
+use fmi2_component::{Causality, Component, Initial, Key, Log, Model, Refusal, Status, Variability, Variable};
 
 struct Moody;
 
@@ -83,9 +80,9 @@ const ERROR_ON_STEP: i32 = 3;
 const FATAL_ON_STEP: i32 = 4;
 const PANIC_ON_DROP: i32 = 5;
 
-/// Its mood, and the number of further outputs.
+/// Its mood.
 #[derive(Clone)]
-struct Person(i32, u32);
+struct Person(i32);
 
 impl Drop for Person {
     fn drop(&mut self) {
@@ -97,25 +94,7 @@ impl Component for Person {
     type Model = Moody;
 
     fn new() -> Self {
-        Self(0, 0)
-    }
-
-    /// The file of that name has as many bytes as there are further outputs.
-    fn adopt(&mut self, guid: &str, resources: &Resources) -> Result<(), Refusal> {
-        let content = resources.read("mood")?;
-        if guid != guid_of(Moody::GUID, &content) {
-            return Err(foreign::<Moody>(guid));
-        }
-        *self = Self(-1, content.len() as u32);
-        Ok(())
-    }
-
-    fn further(&self) -> Range<u32> {
-        7..7 + self.1
-    }
-
-    fn get_further(&self, reference: u32) -> f64 {
-        f64::from(reference) / 2.0
+        Self(0)
     }
 
     fn get_integer(&self, _: Mood) -> i32 {
@@ -198,36 +177,6 @@ fn what_a_component_does_not_provide_is_refused() {
     refused!(m.fmi2SerializedFMUstateSize(state, &mut size) => "cannot be serialised");
     let absent = "the model has no variables of type Real";
     refused!(m.fmi2GetReal(&0, 1, &mut 0.0) => "value reference 0 is unknown", absent);
-}
-
-#[test]
-fn a_model_of_the_resources_has_a_guid_and_outputs_of_its_own_to_which_a_reset_leads_back() {
-    let folder = std::env::temp_dir().join(format!("fmi2 mood {}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join("mood"), "!!").unwrap();
-    let location = CString::new(folder.to_str().unwrap()).unwrap();
-    let guid = |content: &str| CString::new(format!("{{{}}}", guid_of(Moody::GUID, content.as_bytes()))).unwrap();
-    let new = |guid: &CString, location| Master::instantiate(PERSON, 1, [c"one".as_ptr(), guid.as_ptr(), location]);
-    let m = new(&guid("!!"), location.as_ptr());
-    for _ in 0..2 {
-        m.start();
-        assert_eq!((m.integer(0), m.reals(&[7, 8])), (-1, [3.5, 4.0]));
-        refused!(m.fmi2GetReal(&9, 1, &mut 0.0) => "value reference 9 is unknown", "from 7 to 8");
-        refused!(m.fmi2SetReal(&7, 1, &0.0) => "value reference 7 is unknown");
-        m.well(m.set_integer(0, ERROR_ON_STEP));
-        m.well(call!(m.fmi2Reset()));
-    }
-    for (guid, location, part) in [
-        (guid("!"), location.as_ptr(), "do not belong together"),
-        (guid("!!"), null(), "NULL"),
-        (guid("!!"), c"file:///nowhere".as_ptr(), "there is no mood"),
-    ] {
-        let m = new(&guid, location);
-        assert!(m.c.is_null());
-        let heard = m.heard();
-        assert!(heard.len() == 1 && heard[0].text.contains(part), "{heard:?}");
-    }
-    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]

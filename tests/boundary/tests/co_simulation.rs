@@ -208,25 +208,6 @@ fn the_state_of_another_model_or_interface_is_refused() {
 }
 
 #[test]
-fn a_parameter_tuned_between_steps_holds_from_the_next_step_on() {
-    let fmu = Fmu::plant();
-    let from = |k: f64, r: f64, state: [f64; 4]| {
-        let states = STATES.into_iter().zip(state);
-        Master::started(&fmu, CoSimulation, &states.chain([(K, k), (R, r)]).collect::<Vec<_>>())
-    };
-    let tuned = from(11_680.0, 0.65, [0.005, 0.1, 0.0, 0.3]);
-    steps(&tuned, 0, 100, 1e-3);
-    tuned.well(tuned.set_reals(&[K, R], &[9_000.0, 0.8]));
-    let fresh = from(9_000.0, 0.8, tuned.reals(&STATES));
-    steps(&tuned, 100, 100, 1e-3);
-    steps(&fresh, 0, 100, 1e-3);
-    assert!(fresh.impacts() > 0);
-    for (one, other) in tuned.reals(&STATES).into_iter().zip(fresh.reals(&STATES)) {
-        assert!((one - other).abs() < 1e-12, "{one} is not {other}");
-    }
-}
-
-#[test]
 fn a_start_parameter_and_its_output_are_one_value() {
     for interface in [CoSimulation, ModelExchange] {
         for (output, parameter) in STATES.into_iter().zip(START_PARAMETERS) {

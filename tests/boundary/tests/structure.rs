@@ -263,39 +263,6 @@ fn states_are_taken_set_back_and_carried_to_another_instance_of_the_same_structu
     assert_eq!(m.restore(&damaged), Status::Error);
 }
 
-/// Limit of the displacement at the first point, m: a little more than half of the resonant motion.
-const LIMIT: f64 = 0.0015;
-
-/// Number of the first of so many steps that ends because the displacement at the first point has passed its limit, and this displacement; the
-/// file has `interval` in it.
-fn first_beyond(interval: &str, step: f64, steps: u32) -> Option<(u32, f64)> {
-    let content = frame()
-        .replace(r#""tip", "row""#, &format!(r#""tip", "limit": {LIMIT}, "row""#))
-        .replace(r#""excitation""#, &format!(r#"{interval}"excitation""#));
-    let m = new(&format!("limits {step} {steps}"), &content);
-    m.well(m.set_reals(&[AMPLITUDE, OMEGA], &[1.2, 54.8]));
-    m.start();
-    let n = (0..steps).find(|n| m.step(f64::from(*n) * step, step) == Status::Error)?;
-    let heard = m.heard();
-    assert!(
-        heard[0].text.contains("the shaker reached its limit: the tip is"),
-        "{heard:?}"
-    );
-    Some((n, m.real(POINTS[0])))
-}
-
-#[test]
-fn a_limit_is_checked_within_long_steps_and_ends_the_step_where_it_was_found_passed() {
-    let period = std::f64::consts::TAU / 54.8;
-    let checked = r#""check_interval": 1e-3, "#;
-    let (fine, _) = first_beyond(checked, 1e-3, 3000).unwrap();
-    let (coarse, tip) = first_beyond(checked, period, 30).unwrap();
-    assert_eq!(coarse, (f64::from(fine + 1) * 1e-3 / period) as u32);
-    assert!(tip.abs() > LIMIT && tip.abs() < 1.15 * LIMIT, "{tip}");
-    // At the ends of the steps alone the displacement has not passed it.
-    assert_eq!(first_beyond("", period, coarse + 1), None);
-}
-
 #[test]
 fn what_a_structure_does_not_have_is_refused_in_one_sentence() {
     let content = frame();

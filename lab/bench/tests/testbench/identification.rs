@@ -168,16 +168,6 @@ fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() 
 }
 
 #[test]
-fn the_exact_orbit_beside_a_held_base_is_that_of_the_base_as_it_moves() {
-    let found = identified_in(&dimensionless(
-        "chain.hold=true chain.reference=false controller.samples_per_period=64 record.hold_periods=240",
-    ));
-    // The fundamental of this staircase is 4e-4 smaller than that of the samples.
-    let [sigma, g] = off(&found);
-    assert!(sigma < 1e-4 && g < 1e-5, "{:?}", found.lock.at);
-}
-
-#[test]
 fn a_lock_through_30_db_takes_less_than_twice_the_periods_and_states_how_far_off_it_is() {
     let found = identified("chain.snr=30");
     let lock = found.lock;

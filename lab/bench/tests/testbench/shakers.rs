@@ -128,24 +128,6 @@ fn a_lock_behind_a_shaker_states_its_force_in_newtons_and_its_command_in_volts()
     assert!(lock.at.f_n.is_none() && lock.command_v.is_none());
 }
 
-#[test]
-fn a_motion_that_is_not_steady_behind_a_shaker_ends_the_search_with_its_reason() {
-    let scene = preset(2, "").unwrap();
-    let mut n = 0.0;
-    let mut rig = Altered::reading(&scene, |sensors| {
-        n += 1.0;
-        // The sensor of the response changes its sensitivity by 3 % in a beat of 41 periods of 100 samples, which the loop follows.
-        let response = sensors.response * (1.0 + 0.03 * f64::sin(TAU * n / 4100.0));
-        Sensors { response, ..sensors }
-    });
-    let error = record(&mut rig, &scene).map(|_| ()).unwrap_err();
-    assert!(
-        matches!(error, ExperimentError::NotSteady { periods: 150..170, .. }),
-        "{error}"
-    );
-    assert!(error.to_string().contains("is not steady: its "), "{error}");
-}
-
 /// The points are those of structure and shaker, and are compared as the driven mode alone would have them.
 #[test]
 fn tracked_points_behind_a_shaker_belong_to_their_scene_and_not_to_a_wrong_one() {

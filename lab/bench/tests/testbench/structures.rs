@@ -143,17 +143,6 @@ fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
 }
 
 #[test]
-fn limits_are_in_newton_and_of_the_displacement_at_the_sensor() {
-    let limits = "[excitation] -> [resonance]\nsensor_quantity = \"velocity\"\n[phase_lock]\namplitude_max = 3\nresponse_max = 0.004\n[excitation]";
-    let scene = beam(limits).unwrap();
-    let config = scene.controller_config();
-    assert!((config.amplitude_max.unwrap() / (3.0 * scene.amplitude / 1.2) - 1.0).abs() < 1e-14);
-    assert!((config.response_max.unwrap() / (0.004 * 0.51252 / 0.1) - 1.0).abs() < 1e-14);
-    // A velocity at phase resonance is in phase with the force.
-    assert!(config.phase_target.abs() < 1e-15 && scene.knowledge().is_at_phase_resonance());
-}
-
-#[test]
 fn matrices_give_modes_and_the_participation_of_the_base() {
     let folder = matrices(GOOD);
     let scene = of(&folder, MATRICES).unwrap();

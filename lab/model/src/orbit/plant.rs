@@ -554,24 +554,4 @@ mod tests {
         let off = off(&mut section, &(x + Unknowns::repeat(1e-3)));
         assert!(off[0] < 1e-6 && off[1] < 1e-6, "{off:?}");
     }
-
-    #[test]
-    fn a_motion_of_a_pattern_is_selected_by_phase_and_amplitude_of_its_response() {
-        let scene = Dimensionless::new(0.01, 1.2, 0.65, 0.0);
-        for phase in [-90.0_f64, -75.0] {
-            let scene = Dimensionless {
-                definition: scene.definition.at_phase(phase.to_radians()),
-                ..scene
-            };
-            let exact = at_speed(&scene, 0.9).expect("an orbit");
-            let map = &mut ImpactSection { scene: &scene, pattern: &ImpactPattern::symmetric() };
-            let conditions = [
-                Condition::Phase(scene.definition.phase),
-                Condition::response(scene.definition.phase, exact.c),
-            ];
-            let near = exact.unknowns() + Unknowns::from([0.0, 0.0, 0.0, 0.0, 0.01, -0.01]);
-            let found = Closing { map, conditions }.solve(near).expect("a motion");
-            assert!((found - exact.unknowns()).norm() < 1e-10, "{found} {exact:?}");
-        }
-    }
 }
