@@ -35,12 +35,12 @@ pub struct Component {
     pub png: &'static [u8],
     /// The figure again as SVG, and what the description cannot say, as HTML.
     pub page: Cow<'static, str>,
-    /// Files in `resources/`.
-    pub resources: Vec<File>,
+    /// Other files, by their paths in the FMU.
+    pub files: Vec<File>,
 }
 
 macro_rules! component {
-    ($identifier:literal, $package:literal, $xml:expr, $resources:expr) => {
+    ($identifier:literal, $package:literal, $xml:expr, $files:expr) => {
         Component {
             identifier: $identifier,
             package: $package,
@@ -53,7 +53,7 @@ macro_rules! component {
                 include_str!(concat!("pack/pictures/", $identifier, ".svg")),
                 include_str!(concat!("pack/pictures/", $identifier, ".html"))
             )),
-            resources: $resources,
+            files: $files,
         }
     };
 }
@@ -192,9 +192,8 @@ pub fn pack(components: &[Component], binaries: &[Binary]) -> Result<Vec<File>, 
         ];
         let entries = entries.map(|(name, content)| (name.into(), content));
         let entries = entries.into_iter().filter(|(_, content)| !content.is_empty());
-        let resources = component.resources.iter();
-        let resources = resources.map(|(name, content)| (format!("resources/{name}"), content.clone()));
-        fmus.push(archive(name, entries.chain(resources).chain(libraries))?);
+        let files = component.files.iter().cloned();
+        fmus.push(archive(name, entries.chain(files).chain(libraries))?);
     }
     Ok(fmus)
 }

@@ -135,9 +135,12 @@ class Component:
 
 def own_experiment(fmu: Fmu) -> tuple[np.ndarray, dict[str, float]]:
     """What the experiment inside an FMU gives, and how far its columns are off the references beside it, relative."""
-    folder = fmu.folder / "resources"
-    (experiment,) = ElementTree.parse(folder / "experiments.xml").getroot()
-    files = {element.tag: folder / element.get("source") for element in experiment}
+    manifest = fmu.folder / "extra" / "org.fmi-standard.fmi-ls-ref" / "fmi-ls-manifest.xml"
+    (related,) = ElementTree.parse(manifest).getroot()
+    assert related.get("role") == "experiment/smoke-test"
+    file = manifest.parent / related.get("source")
+    (experiment,) = ElementTree.parse(file).getroot()
+    files = {element.tag: file.parent / element.get("source") for element in experiment}
     values = {
         parameter.get("name"): parameter[0].get("value")
         for parameter in ElementTree.parse(files["Parameters"]).getroot()[0]

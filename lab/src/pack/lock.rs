@@ -1,6 +1,6 @@
 //! An experiment inside each FMU, so that a new program can be tried before a rig is: parameters, the inputs sample by sample, and outputs to compare
 //! with. For oscillator and controller it is a lock of the default scene, for a structure a sine. The files are those of the draft FMI-LS-REF
-//! 1.0.0-alpha.1, in `resources/`.
+//! 1.0.0-alpha.1: a manifest, which names the experiment in `resources/`.
 
 use std::fmt::Write;
 
@@ -14,6 +14,9 @@ use crate::scene::{PAPER, Scene, Structure};
 const RATE: u32 = 200;
 /// Length of the experiment, s; the loop has locked by then.
 const STOP: u32 = 40;
+
+/// Where a program that knows the layered standard looks.
+const MANIFEST: &str = "extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml";
 
 /// The columns of one FMU.
 struct Half {
@@ -29,8 +32,15 @@ impl Half {
         }
     }
 
-    /// The files in `resources/`, of an experiment of this name, meaning, stop time and step, s.
+    /// The files of an experiment of this name, meaning, stop time and step, s.
     fn files(self, [name, meaning]: [&str; 2], [stop, step]: [f64; 2], parameters: Vec<u8>) -> Vec<File> {
+        let manifest = format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiReferences xmlns:fmi-ls=\"http://fmi-standard.org/fmi-ls-manifest\" \
+             fmi-ls:fmi-ls-name=\"org.fmi-standard.fmi-ls-ref\"\n  fmi-ls:fmi-ls-version=\"1.0.0-alpha.1\"\n  \
+             fmi-ls:fmi-ls-description=\"Layered Standard providing information on related files included in an FMU.\">\n  \
+             <Related type=\"application/x-ma-hs-experiments\" source=\"../../resources/{name}.exp\" role=\"experiment/smoke-test\"\n    \
+             description=\"{meaning}\"/>\n</fmiReferences>\n"
+        );
         let experiment = format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Experiments name=\"vines\">\n  <Experiment name=\"{name}\" startTime=\"0\" \
              stopTime=\"{stop}\" stepSize=\"{step}\"\n    description=\"{meaning}\">\n    \
@@ -38,10 +48,11 @@ impl Half {
              source=\"{name}-stimuli.csv\"/>\n    <References type=\"text/csv\" source=\"{name}-references.csv\"/>\n  </Experiment>\n</Experiments>\n"
         );
         [
-            ("experiments.xml".into(), experiment.into_bytes()),
-            (format!("{name}.ssv"), parameters),
-            (format!("{name}-stimuli.csv"), self.stimuli.into_bytes()),
-            (format!("{name}-references.csv"), self.references.into_bytes()),
+            (MANIFEST.into(), manifest.into_bytes()),
+            (format!("resources/{name}.exp"), experiment.into_bytes()),
+            (format!("resources/{name}.ssv"), parameters),
+            (format!("resources/{name}-stimuli.csv"), self.stimuli.into_bytes()),
+            (format!("resources/{name}-references.csv"), self.references.into_bytes()),
         ]
         .into()
     }

@@ -18,8 +18,8 @@ use crate::table::Table;
 
 /// `modelIdentifier`.
 const IDENTIFIER: &str = "Structure";
-/// The file of the structure in `resources/`.
-const FILE: &str = "structure.json";
+/// The file of the structure.
+const FILE: &str = "resources/structure.json";
 
 /// The FMU of a structure, which has the library of the oscillator.
 ///
@@ -67,7 +67,7 @@ pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -
         library_guid: oscillator.library_guid.clone(),
         png: b"",
         page: page(structure, step),
-        resources: [(FILE.to_owned(), content)].into_iter().chain(experiment).collect(),
+        files: [(FILE.to_owned(), content)].into_iter().chain(experiment).collect(),
     })
 }
 
@@ -105,7 +105,7 @@ fn page(structure: &Structure, step: f64) -> Cow<'static, str> {
     }
     let text = format!(
         "<p>A linear structure carries a cavity, in which a particle flies freely and hits the walls. {drive} Between impacts the motion is a \
-         closed formula; there is no step-size error. The structure is fixed, in <code>resources/{FILE}</code>; parameters of cavity and \
+         closed formula; there is no step-size error. The structure is fixed, in <code>{FILE}</code>; parameters of cavity and \
          particle can be set. The FMU is for co-simulation.</p>"
     );
     Cow::Owned(text + &Table::new(head).rows(modes).html("Modes").into_string())

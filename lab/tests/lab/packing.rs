@@ -22,7 +22,7 @@ fn component() -> Component {
         library_guid: GUID.into(),
         png: b"",
         page: "".into(),
-        resources: Vec::new(),
+        files: Vec::new(),
     }
 }
 
