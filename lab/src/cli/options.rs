@@ -11,7 +11,7 @@ use vines::fmu::{Connection, FmuController, FmuError};
 use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
-use vines::scene::{Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
+use vines::scene::{Dimensionless, Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
 use vines::{cells, fmu_rig, table::Table};
 
 use super::failure::Failure;
@@ -325,5 +325,16 @@ pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
     match value > 0.0 && value <= 1e8 {
         true => Ok(value),
         false => Err("must be above 0 and at most 1e8".into()),
+    }
+}
+
+/// Refuses a detuning, of the option `name`, whose frequency is not positive.
+pub(super) fn positive_frequency(name: &str, scene: &Dimensionless, sigma: f64) -> Result<(), Failure> {
+    match 1.0 + scene.epsilon * sigma > 0.0 && sigma.is_finite() {
+        true => Ok(()),
+        false => Err(Failure::input(format!(
+            "{name} = {sigma} (dimensionless): it must be finite, and above -1/epsilon = {:.4}, where the frequency is 0",
+            -1.0 / scene.epsilon
+        ))),
     }
 }
