@@ -138,7 +138,10 @@ impl Map {
             curves: Vec::new(),
         };
         let at = |x, y| map.inputs(&[x, y]);
-        let [[a, b], [c, d]] = [[at(x.from, y.from)?, at(x.to, y.from)?], [at(x.from, y.to)?, at(x.to, y.to)?]];
+        let [[a, b], [c, d]] = [
+            [at(x.from, y.from)?, at(x.to, y.from)?],
+            [at(x.from, y.to)?, at(x.to, y.to)?],
+        ];
         for (axis, is_constant) in [(x, a == b && c == d), (y, a == c && b == d)] {
             if is_constant {
                 return Err(CellError::WithoutEffect(axis.key.clone()));

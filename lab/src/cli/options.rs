@@ -41,16 +41,7 @@ impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
         log_warnings();
         let scene = Scene::load(self.scene.as_deref(), &self.set)?;
-        let named = scene
-            .implausible()
-            .map(|Implausible { name, value, unit }| format!("{name} = {value:.3} {unit}"));
-        let named: Vec<String> = named.map(|text| text.trim_end().into()).collect();
-        if !named.is_empty() {
-            log::warn!(
-                "{}: is this meant? A scene has k in N/m, M and m in kg, c in N s/m, b in m, and a shaker is in the same units",
-                named.join(", ")
-            );
-        }
+        warn_implausible(&scene, "A scene has");
         Ok(scene)
     }
 
@@ -89,6 +80,20 @@ impl SceneArguments {
     fn text(&self) -> Result<Option<String>, SceneError> {
         let Some(path) = &self.scene else { return Ok(None) };
         Scene::text(path).map(Some)
+    }
+}
+
+/// Warns of values that are hardly meant. `whose`: what has them, and a verb.
+pub(super) fn warn_implausible(scene: &Scene, whose: &str) {
+    let named = scene
+        .implausible()
+        .map(|Implausible { name, value, unit }| format!("{name} = {value:.3} {unit}"));
+    let named: Vec<String> = named.map(|text| text.trim_end().into()).collect();
+    if !named.is_empty() {
+        log::warn!(
+            "{}: is this meant? {whose} k in N/m, M and m in kg, c in N s/m, b in m, and a shaker is in the same units",
+            named.join(", ")
+        );
     }
 }
 

@@ -351,7 +351,6 @@ fn multipliers(multipliers: &[[f64; 2]]) -> String {
     each.collect::<Vec<_>>().join(", ")
 }
 
-
 /// A result as JSON, or as text under a title and the parameters of the scene.
 fn shown(
     scene: &Dimensionless,

@@ -143,7 +143,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         } else {
             line.into()
         };
-        let shown: Vec<String> = words(arguments, &line, &arguments.out).iter().map(|word| quoted(word)).collect();
+        let shown: Vec<String> = words(arguments, &line, &arguments.out)
+            .iter()
+            .map(|word| quoted(word))
+            .collect();
         let shown = shown.join(" ");
         super::say(&shown);
         let command = Cli::try_parse_from(words(arguments, &line, new.path())).map_err(Failure::input)?;

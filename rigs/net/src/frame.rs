@@ -524,7 +524,10 @@ mod tests {
                 Refusal::Drive { index: 2, value: 1.0, limit: 0.01 }.answer(&at),
                 0x02d2_922c,
             ),
-            (Refusal::SampleTime { server: 1e-3, client: 2e-3 }.answer(&at), 0x0bb1_66c2),
+            (
+                Refusal::SampleTime { server: 1e-3, client: 2e-3 }.answer(&at),
+                0x0bb1_66c2,
+            ),
         ] {
             let bytes = frame.encode();
             assert_eq!(crc32fast::hash(&bytes[..CHECKSUM_AT]), checksum, "{frame:?}");
