@@ -397,7 +397,7 @@ impl File<'_> {
             channel.values = values.map(|(_, value)| *value).collect();
         }
         Some(format!(
-            "{}: {} samples repeat time and values of the one before them, the first one in {}, and are left out",
+            "{}: rows that repeat time and values of the row before are left out: {}, the first one in {}",
             self.origin,
             copies.len(),
             self.place(first)

@@ -278,7 +278,7 @@ impl Recording {
             for value in [low, high].into_iter().filter(|_| low < high) {
                 if let Some((sample, [from, to])) = glitch(values, value, rounding) {
                     return refused(format!(
-                        ", channel {channel}: sample {} ({:.4} s) is {value:e} {unit}, and all others are from {from:e} to {to:e} {unit}: no oscillation \
+                        ", channel {channel}: sample {} ({:.4} s) is {value:.4e} {unit}, and all others are from {from:.4e} to {to:.4e} {unit}: no oscillation \
                          has such a sample; repair it, or cut the recording there",
                         sample + 1,
                         sample as f64 * sample_time,
@@ -287,7 +287,7 @@ impl Recording {
                 }
                 if let Some(stay) = clipped(values, value, rounding) {
                     return refused(format!(
-                        ", channel {channel} is clipped: it stays at {value:e} {} for {stay:.1} samples at a time, longer than a smooth peak; reduce \
+                        ", channel {channel} is clipped: it stays at {value:.4e} {} for {stay:.1} samples at a time, longer than a smooth peak; reduce \
                          the gain, and record again",
                         measurand.unit()
                     ));
