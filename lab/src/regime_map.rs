@@ -10,7 +10,7 @@ use crate::cells::{Cell, CellError, Cells, SIGMA};
 use crate::map::{RegimeResult, observe_confirmed};
 use crate::orbit::{BifurcationCurve, ContinuationLimits, bifurcation_curves};
 use crate::regime::Regime;
-use crate::scene::Family;
+use crate::scene::{Dimensionless, Family};
 use crate::theory::SlowFlow;
 
 /// Most values of an axis: all cells are in memory, 200 bytes each, and in one figure.
@@ -137,9 +137,14 @@ impl Map {
             cells: Vec::new(),
             curves: Vec::new(),
         };
-        for x in [x.from, x.to] {
-            for y in [y.from, y.to] {
-                map.common.at(&[x, y])?;
+        let at = |x, y| map.inputs(&[x, y]);
+        let [[a, b], [c, d]] = [
+            [at(x.from, y.from)?, at(x.to, y.from)?],
+            [at(x.from, y.to)?, at(x.to, y.to)?],
+        ];
+        for (axis, is_constant) in [(x, a == b && c == d), (y, a == c && b == d)] {
+            if is_constant {
+                return Err(CellError::WithoutEffect(axis.key.clone()));
             }
         }
         Ok(map)
@@ -168,10 +173,16 @@ impl Map {
         Ok(())
     }
 
+    /// What the cell at these values of x and y depends on: its numbers, without units of length and frequency, detuning and start.
+    fn inputs(&self, place: &[f64; 2]) -> Result<(Dimensionless, f64, [f64; 4]), CellError> {
+        let Cell { scene, sigma, numbers } = self.common.at(place)?;
+        let numbers = Dimensionless { omega0: 1.0, b: 1.0, ..numbers };
+        Ok((numbers, sigma, scene.dimensionless_start()))
+    }
+
     /// The cell at these values of x and y.
     fn cell(&self, place: &[f64; 2], confirmations: usize) -> Result<MapCell, CellError> {
-        let Cell { scene, sigma, numbers } = self.common.at(place)?;
-        let start = scene.dimensionless_start();
+        let (numbers, sigma, start) = self.inputs(place)?;
         let (mut result, differing) = observe_confirmed(&numbers, sigma, start, self.common.periods(), confirmations)?;
         let mut coexisting = Vec::new();
         if let Some(regime) = differing {

@@ -36,6 +36,8 @@ pub enum Reason {
     NoImpacts { stable: Vec<Orbit>, onset: f64 },
     /// The motion is of this regime, and coexists with these stable orbits.
     Coexists { stable: Vec<Orbit>, regime: Regime },
+    /// A limit has cut the motion off on its way; these orbits are stable.
+    CutOff { stable: Vec<Orbit> },
 }
 
 /// Whether the loop runs away from resonance: its frequency has left the first one in the direction opposite to the one that the phase asks for,
@@ -102,6 +104,14 @@ pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Optio
         Regime::Unknown | Regime::Unresolved | Regime::NotEstablished => None,
         Regime::NoImpacts => Some(Reason::NoImpacts { stable, onset: d.lambda }),
         regime => Some(Reason::Coexists { stable, regime }),
+    }
+}
+
+/// The reason after a limit has cut the motion off, whose regime says nothing then.
+pub fn cut_off(scene: &Scene, d: &Dimensionless) -> Option<Reason> {
+    match reason(scene, d, Some(Regime::Other))? {
+        Reason::Coexists { stable, .. } => Some(Reason::CutOff { stable }),
+        reason => Some(reason),
     }
 }
 

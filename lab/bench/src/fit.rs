@@ -120,6 +120,7 @@ pub struct Found {
 /// # Errors
 /// As [`Data::ideal`] and [`Recording::curve`].
 pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize)) -> Result<Found, NotFound> {
+    plausible(&measured.points, scene)?;
     let curves: Result<Vec<_>, _> = measured.recordings.iter().map(|one| one.curve(scene)).collect();
     let (curves, stretches): (Vec<_>, Vec<_>) = curves?.into_iter().unzip();
     let mut data = Data {
@@ -134,6 +135,27 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
     data.known.extend(linear.iter().map(|one| Known::Linear(one.linear)));
     let hypotheses = data.hypotheses(&scene.plant, progress)?;
     Ok(Found { hypotheses, data, stretches: stretches.concat(), linear })
+}
+
+/// Refuses points whose drive is no drive at phase resonance: there the response is larger than the base, and the base feeds at least what the damper takes.
+fn plausible(points: &[MeasuredPoint], scene: &Scene) -> Result<(), RecordingError> {
+    let (Units { response, reference, .. }, stated) = (scene.units(), scene.knowledge().linear.bandwidth());
+    for (n, MeasuredPoint { response: a, drive: e, .. }) in points.iter().enumerate() {
+        let allowed = 2.0 * recording::LEAST_DAMPING * a.value..a.value;
+        if e.value > 0.0 && a.value > 0.0 && !allowed.contains(&e.value) {
+            return Err(RecordingError::new(format!(
+                "point {}: at phase resonance a response of {:.4e} needs a drive between {:.4e} and {:.4e} (without impacts, with the damping of the \
+                 scene, {:.4e}), and this one is {:.4e}: give the units of both, for instance --column A=NAME:mm --column E=NAME:um",
+                n + 1,
+                response.quantity(a.value),
+                reference.quantity(allowed.start),
+                reference.quantity(allowed.end),
+                reference.quantity(stated * a.value),
+                reference.quantity(e.value)
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// What the data say of a linear response that was measured beside them.

@@ -21,7 +21,7 @@ use vines_model::numerics::{SIGNIFICANT, mean, mean_square, standard_deviation};
 
 use crate::rig::{Drive, Rig, RigError, Scaled};
 use vines_scene::knowledge::Target;
-use vines_scene::linear::{LinearResponse, MeasuredLinear, ParticleState};
+use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, ParticleState};
 use vines_scene::plan::Plan;
 use vines_scene::scene::{Unit, Units};
 
@@ -340,7 +340,7 @@ fn growth(
         shaker: None,
     };
     let is_determined = gain.norm().is_finite() && deviation * u_gain < DETERMINED;
-    (is_determined.then_some(linear), u_gain)
+    (is_determined.then(|| linear.stated()), u_gain)
 }
 
 /// The readings of the response without what the drawing's structure adds to that of its driven mode, from rest: the beat of two modes may last longer
@@ -540,6 +540,9 @@ fn quantities_of_base(base: &Fitted, u: f64, drive: f64, plan: &Plan) -> [Checke
     let controlled = plan.lock.base_bandwidth.is_some();
     let tolerance = if controlled { GAIN - 1.0 } else { FACTOR };
     let u_clock = base.u(&[Complex64::ZERO, Complex64::ONE]) / omega;
+    // As of a stated point.
+    let u_clock = u_clock.hypot(POINT_RESOLUTION * plan.knowledge.linear.bandwidth());
+    let u = u.hypot(POINT_RESOLUTION);
     let clock = [base.found.pole.im / omega, u_clock, 1.0];
     let (name, gain) = ("frequency of the base over that of the drive", [ratio, u * ratio, 1.0]);
     [

@@ -703,13 +703,29 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
         one.response.truncate(500);
         one.drive.truncate(500);
     };
-    let cases: [Case; 9] = [
+    let mild = |one: &mut Recording| {
+        let largest = one.response.iter().copied().fold(0.0, f64::max);
+        let clipped = one.response.iter().map(|value| value.min(0.97 * largest));
+        one.response = clipped.collect();
+    };
+    // A logger writes one value where it has none.
+    let missing = |one: &mut Recording| [700, 701, 3000].into_iter().for_each(|n| one.drive[n] = 9999.0);
+    let cases: [Case; 12] = [
         (
             &|one| one.response[17] = f64::NAN,
             &["channel y", "sample 18", "repair"],
         ),
         (&|one| one.drive.truncate(5999), &["y has 6000 samples", "x has 5999"]),
         (&clip, &["channel y is clipped", "reduce the gain"]),
+        (&mild, &["channel y is clipped"]),
+        (
+            &missing,
+            &["channel x: sample 701 (", "s) is 9.9990e3 m, and all others are from"],
+        ),
+        (
+            &|one| one.response[0] = -0.03,
+            &["channel y: sample 1 (0.0000 s) is -3.0000e-2 m"],
+        ),
         (&rest, &["base x rests", "connected"]),
         (&|one| std::mem::swap(&mut one.response, &mut one.drive), &["swapped"]),
         (&reverse, &["wrong sign", "--drive x:-1"]),
@@ -730,6 +746,20 @@ fn channels_that_are_no_recording_of_a_rig_near_resonance_are_refused_with_what_
 }
 
 #[test]
+fn a_channel_of_few_bits_or_that_is_held_for_some_samples_is_not_clipped() {
+    let scene = wrong_scene();
+    let good = recording();
+    let largest = good.response.iter().copied().fold(0.0, f64::max);
+    for (steps, held) in [(128.0, 1), (512.0, 1), (1e6, 1), (512.0, 4)] {
+        let rounded = |value: f64| (value / largest * steps).round() * largest / steps;
+        let response = (0..good.response.len()).map(|n| rounded(good.response[n / held * held]));
+        let one = Recording { response: response.collect(), ..good.clone() };
+        let prepared = one.prepared(&scene.knowledge()).map(|_| ());
+        assert!(prepared.is_ok(), "{steps}, {held}: {prepared:?}");
+    }
+}
+
+#[test]
 fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_without_a_channel_of_the_base() {
     let scene = wrong_scene();
     let (omega0, zeta, dt) = (RIG.natural_frequency(), 0.01, 1e-3);
@@ -741,7 +771,8 @@ fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_
     };
     let mut pulls = Vec::new();
     for name in ["", "x"].repeat(10) {
-        let response: Vec<f64> = (0..6000).map(|n| response(n) + 1e-6 * noise()).collect();
+        // Noise that is well above the resolution of a point, which is stated as well.
+        let response: Vec<f64> = (0..6000).map(|n| response(n) + 2e-5 * noise()).collect();
         let drive = response
             .iter()
             .map(|_| if name.is_empty() { 0.0 } else { 1e-7 * noise() });
@@ -777,6 +808,8 @@ fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_
         (decay.omega.value - omega0).abs() < 2.0 * decay.omega.uncertainty,
         "{decay}"
     );
+    // Without noise too, nothing is more certain than a point: 1e-4 of the half-power bandwidth.
+    assert!(decay.omega.uncertainty > 2e-4 * zeta * omega0, "{decay}");
     // The mean square of 40 normal values has a standard deviation of 0.22.
     let square = mean_square(pulls.iter().copied());
     assert!((0.5..1.5).contains(&square), "{square}");
@@ -1198,6 +1231,36 @@ fn the_clock_is_fitted_and_the_phase_of_the_base_says_which_times_hold() {
         .map(|(n, value)| (value - f64::sin(omega * (one.start + (one.sample_time * n as f64)))).abs());
     let worst = worst.fold(0.0, f64::max);
     assert!(worst < 0.05, "{worst}");
+}
+
+#[test]
+fn rows_that_are_written_twice_are_left_out_and_a_clock_that_repeats_times_keeps_its_rows() {
+    let row = |n: i32, time: f64| {
+        format!(
+            "{time},{},{}\n",
+            (0.06 * f64::from(n)).sin(),
+            (0.06 * f64::from(n) + 1.5).sin()
+        )
+    };
+    let even = |n: i32| 1e-3 * f64::from(n);
+    let twice = |n: i32| row(n, even(n)).repeat(if [300, 701].contains(&n) { 2 } else { 1 });
+    // Rounded to a sample: it repeats a time and leaves one out.
+    let rounded = |n: i32| row(n, if n == 300 { even(299) } else { even(n) });
+    for (text, count, said) in [
+        (
+            (0..1000).map(twice).collect::<String>(),
+            1000,
+            Some("left out: 2, the first one in row 303"),
+        ),
+        ((0..1000).map(rounded).collect(), 1000, None),
+    ] {
+        let one = read(format!("time,y,x\n{text}").as_bytes(), "y", "x", None).unwrap();
+        assert_eq!(one.response.len(), count, "{:?}", one.notes);
+        assert!((one.sample_time / 1e-3 - 1.0).abs() < 1e-6, "{}", one.sample_time);
+        let note = one.notes.iter().find(|note| note.contains("are left out: "));
+        assert_eq!(note.is_some(), said.is_some(), "{:?}", one.notes);
+        assert!(note.is_none_or(|note| note.contains(said.unwrap())), "{note:?}");
+    }
 }
 
 #[test]

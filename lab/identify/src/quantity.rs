@@ -196,7 +196,9 @@ impl FromStr for Known {
 
     fn from_str(text: &str) -> Result<Self, ArgumentError> {
         let quantities = Quantity::ALL.map(|quantity| quantity.symbol()[0]);
-        let strengths = Hypothesis::ALL.map(|hypothesis| hypothesis.names()[1]);
+        // The spring without a particle has the h of the cubic stiffness.
+        let strengths = Hypothesis::ALL.into_iter().filter(|hypothesis| hypothesis.is_cavity());
+        let strengths = strengths.map(|hypothesis| hypothesis.names()[1]);
         let symbols = quantities
             .into_iter()
             .chain(strengths)

@@ -28,6 +28,10 @@ pub enum CellError {
     Sigma(f64),
     #[error("sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0")]
     Frequency { sigma: f64, omega: f64 },
+    #[error(
+        "{0}: a regime map does not depend on it. It is of the ideal cavity: an axis may be sigma, G or excitation.E, r, and M, k, c, m, b, epsilon, lambda of [plant] or a number of [start]"
+    )]
+    WithoutEffect(String),
     #[error("{0} periods: from {least} to {most} are allowed", least = PERIODS_ALLOWED[0], most = PERIODS_ALLOWED[1])]
     Periods(usize),
 }

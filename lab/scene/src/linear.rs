@@ -259,6 +259,18 @@ impl LinearResponse {
         ]
     }
 
+    /// The response as it is stated: its uncertainties contain the resolution of a point.
+    #[must_use]
+    pub fn stated(self) -> Self {
+        Self {
+            uncertainty: self
+                .uncertainty
+                .hypot(POINT_RESOLUTION * self.bandwidth() * self.omega0),
+            u_gain: self.u_gain.hypot(POINT_RESOLUTION),
+            ..self
+        }
+    }
+
     /// Natural periods in which the amplitude falls by a factor of e.
     pub fn relaxation_periods(&self) -> f64 {
         1.0 / (PI * self.bandwidth())

@@ -234,12 +234,11 @@ impl Session {
                 let reason = match error {
                     // The orbits are those at the requested phase and drive.
                     ExperimentError::OtherThanAsked { .. } => runs_away(),
-                    ExperimentError::NoLock { .. }
-                    | ExperimentError::NotReached { .. }
-                    | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
-                        runs_away().or_else(|| {
-                            advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
-                        })
+                    ExperimentError::NoLock { .. } | ExperimentError::NotReached { .. } => runs_away().or_else(|| {
+                        advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
+                    }),
+                    ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
+                        runs_away().or_else(|| advice::cut_off(scene, &plan.knowledge.numbers))
                     }
                     // An irregular motion may resemble a failed sensor: was there another one to lock on?
                     ExperimentError::Tripped {

@@ -1,5 +1,6 @@
 //! `vines fit`: the parameters of a rig from measured points of its backbone.
 
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -7,17 +8,17 @@ use clap::Args;
 use serde::Serialize;
 use vines::fit::{
     CALIBRATION, FitReport, FittedParameter, Found, Hypothesis, HypothesisReport, Known, LinearVerdict, Measurements,
-    Selection, Stretch, decimals, find, requires_sensor,
+    Quantity, Selection, Stretch, decimals, find, requires_sensor,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
-use vines::scene::Scene;
+use vines::scene::{Scene, Units};
 use vines::survey::without_other_modes;
 use vines::table::{Table, lines};
 use vines::{ArgumentError, cells};
 
 use super::failure::Failure;
-use super::options::{SceneArguments, positive};
+use super::options::{SceneArguments, positive, warn_implausible};
 use super::output::{Results, Written, output, progress_bar, writable};
 use super::points::{Column, Measurement, Reading, Source, is_own, measurement};
 use super::summary::with_unit;
@@ -155,6 +156,9 @@ fn of_linear(verdict: &LinearVerdict) -> String {
 
 /// A value and its standard uncertainty with two digits of it.
 fn with_decimals(Estimate { value, uncertainty }: Estimate) -> String {
+    if !uncertainty.is_finite() {
+        return "not determined".into();
+    }
     let decimals = decimals(uncertainty);
     format!("{value:.decimals$} ± {uncertainty:.decimals$}")
 }
@@ -255,12 +259,33 @@ fn gathered(
     Ok(Gathered { measured, skipped, notes })
 }
 
+/// The scene with what is known of its plant.
+fn with_known(scene: &Scene, known: &[Known]) -> Scene {
+    let mut scene = scene.clone();
+    let plant = &mut scene.plant;
+    for known in known {
+        if let Known::Value { quantity, estimate: Estimate { value, .. } } = *known {
+            match quantity {
+                Quantity::B => plant.half_width = value,
+                Quantity::PrimaryMass => plant.primary_mass = value,
+                Quantity::ParticleMass => plant.particle_mass = value,
+                Quantity::Stiffness => plant.stiffness = value,
+                Quantity::Damping => plant.damping = value,
+                Quantity::Epsilon => plant.particle_mass = value * plant.primary_mass,
+                Quantity::F0 | Quantity::Zeta | Quantity::R => {}
+            }
+        }
+    }
+    scene
+}
+
 /// `read`: as of [`gathered`].
 pub(super) fn run(
     arguments: &Arguments,
     read: &dyn Fn(&Path) -> Result<Source, ArgumentError>,
 ) -> Result<Results, Failure> {
     let scene = arguments.scene.load()?;
+    warn_implausible(&with_known(&scene, &arguments.known), "--known has");
     writable([&arguments.figure, &arguments.out].into_iter().flatten())?;
     let Gathered { measured, skipped, notes } = gathered(arguments, &scene, read)?;
     if measured.points.is_empty() && measured.recordings.is_empty() && skipped == 0 && !notes.is_empty() {
@@ -314,7 +339,9 @@ pub(super) fn run(
             files.paths.clear();
         }
         if !report.describes {
-            files.failures.push(Failure::run(contradiction(&found, &report)));
+            files
+                .failures
+                .push(Failure::run(contradiction(&found, &report, &scene)));
         }
         files
     }))
@@ -389,7 +416,9 @@ fn parameters(report: &FitReport) -> Table {
             None => [
                 with_decimals(Estimate { value, uncertainty }) + doubt,
                 format!("{expected:.0$}", decimals(uncertainty)),
-                format!("{:+.1} u", (value - expected) / uncertainty),
+                Some((value - expected) / uncertainty)
+                    .filter(|u| u.is_finite())
+                    .map_or_else(String::new, |u| format!("{u:+.1} u")),
             ],
         };
         cells![symbol, value, unit, expected, difference]
@@ -426,11 +455,27 @@ fn verdict(report: &FitReport) -> String {
 }
 
 /// Why the exit code is 1.
-fn contradiction(found: &Found, report: &FitReport) -> String {
+fn contradiction(found: &Found, report: &FitReport, scene: &Scene) -> String {
+    // A wrong unit shows beside the scene.
+    let linear = scene.knowledge().linear;
+    let Units { response, reference, .. } = scene.units();
+    let read = found.data.points.first().map_or_else(String::new, |point| {
+        let least = linear.bandwidth() * point.response.value;
+        format!(
+            "\nare the units right? Point 1 was read as {:.4} Hz with a response of {:.4e} and a drive of {:.4e}; the scene has {:.4} Hz and b = {} m, and \
+             without impacts a drive of {:.4e} for this response",
+            point.omega.value / TAU,
+            response.quantity(point.response.value),
+            reference.quantity(point.drive.value),
+            linear.omega0 / TAU,
+            scene.plant.half_width,
+            reference.quantity(least)
+        )
+    });
     match found.hypotheses.possible().next() {
         Some(_) => "a nonlinear spring without a particle describes the data: nothing in them shows impacts".into(),
         None => format!(
-            "none of these hypotheses describes the data; nearest is {}: {}",
+            "none of these hypotheses describes the data; nearest is {}: {}{read}",
             report.best,
             found.worst()
         ),

@@ -11,7 +11,7 @@ use vines::fmu::{Connection, FmuController, FmuError};
 use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
-use vines::scene::{Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
+use vines::scene::{Dimensionless, Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
 use vines::{cells, fmu_rig, table::Table};
 
 use super::failure::Failure;
@@ -41,16 +41,7 @@ impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
         log_warnings();
         let scene = Scene::load(self.scene.as_deref(), &self.set)?;
-        let named = scene
-            .implausible()
-            .map(|Implausible { name, value, unit }| format!("{name} = {value:.3} {unit}"));
-        let named: Vec<String> = named.map(|text| text.trim_end().into()).collect();
-        if !named.is_empty() {
-            log::warn!(
-                "{}: is this meant? A scene has k in N/m, M and m in kg, c in N s/m, b in m, and a shaker is in the same units",
-                named.join(", ")
-            );
-        }
+        warn_implausible(&scene, "A scene has");
         Ok(scene)
     }
 
@@ -89,6 +80,20 @@ impl SceneArguments {
     fn text(&self) -> Result<Option<String>, SceneError> {
         let Some(path) = &self.scene else { return Ok(None) };
         Scene::text(path).map(Some)
+    }
+}
+
+/// Warns of values that are hardly meant. `whose`: what has them, and a verb.
+pub(super) fn warn_implausible(scene: &Scene, whose: &str) {
+    let named = scene
+        .implausible()
+        .map(|Implausible { name, value, unit }| format!("{name} = {value:.3} {unit}"));
+    let named: Vec<String> = named.map(|text| text.trim_end().into()).collect();
+    if !named.is_empty() {
+        log::warn!(
+            "{}: is this meant? {whose} k in N/m, M and m in kg, c in N s/m, b in m, and a shaker is in the same units",
+            named.join(", ")
+        );
     }
 }
 
@@ -325,5 +330,16 @@ pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
     match value > 0.0 && value <= 1e8 {
         true => Ok(value),
         false => Err("must be above 0 and at most 1e8".into()),
+    }
+}
+
+/// Refuses a detuning, of the option `name`, whose frequency is not positive.
+pub(super) fn positive_frequency(name: &str, scene: &Dimensionless, sigma: f64) -> Result<(), Failure> {
+    match 1.0 + scene.epsilon * sigma > 0.0 && sigma.is_finite() {
+        true => Ok(()),
+        false => Err(Failure::input(format!(
+            "{name} = {sigma} (dimensionless): it must be finite, and above -1/epsilon = {:.4}, where the frequency is 0",
+            -1.0 / scene.epsilon
+        ))),
     }
 }

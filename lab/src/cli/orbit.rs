@@ -29,7 +29,7 @@ use super::output::{Results, output, stability, writable};
 use super::summary::{self, parameters};
 use super::{
     failure::Failure,
-    options::{SceneArguments, warn_left_out},
+    options::{SceneArguments, positive_frequency, warn_left_out},
 };
 
 const HELP: &str = "\
@@ -174,12 +174,7 @@ const CURVE_ORBITS: usize = 400;
 /// All components of the frequency response.
 fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<Results, Failure> {
     let [from, to] = limits.sigma;
-    if 1.0 + scene.epsilon * from <= 0.0 {
-        let rule = "1 + epsilon sigma must be above 0";
-        return Err(Failure::input(format!(
-            "--range from sigma = {from} (dimensionless): {rule}"
-        )));
-    }
+    positive_frequency("--range from sigma", scene, from)?;
     let response = response(scene, limits, DOUBLINGS);
     if response.components.is_empty() {
         return Err(Failure::run(format!(
@@ -228,7 +223,7 @@ fn settled(
     (sigma, range): (f64, [f64; 2]),
     start: [f64; 4],
 ) -> Result<String, Failure> {
-    positive_frequency(scene, sigma)?;
+    positive_frequency("--sigma", scene, sigma)?;
     let motion = settle(scene, sigma, start, SETTLE)?;
     let motion = motion.ok_or_else(|| {
         Failure::run(format!(
@@ -255,7 +250,7 @@ fn of_the_plant(arguments: &Arguments, scene: &Scene) -> Result<String, Failure>
     let motion = match arguments.sigma {
         None => resonant_motion_under(plant, definition, scene.amplitude)?,
         Some(sigma) => {
-            positive_frequency(&numbers, sigma)?;
+            positive_frequency("--sigma", &numbers, sigma)?;
             let drive = [numbers.omega(sigma), scene.amplitude];
             let motion = settled_motion(plant, definition, drive, scene.start, SETTLE)?;
             motion.ok_or_else(|| {
@@ -354,16 +349,6 @@ fn events(motion: &PlantMotion) -> Vec<MotionEvent> {
 fn multipliers(multipliers: &[[f64; 2]]) -> String {
     let each = multipliers.iter().map(|[re, im]| format!("{re:.5}{im:+.5}i"));
     each.collect::<Vec<_>>().join(", ")
-}
-
-/// Refuses a detuning whose frequency is not positive.
-fn positive_frequency(scene: &Dimensionless, sigma: f64) -> Result<(), Failure> {
-    match 1.0 + scene.epsilon * sigma > 0.0 && sigma.is_finite() {
-        true => Ok(()),
-        false => Err(Failure::input(format!(
-            "--sigma = {sigma} (dimensionless): it must be finite, and 1 + epsilon sigma above 0"
-        ))),
-    }
 }
 
 /// A result as JSON, or as text under a title and the parameters of the scene.

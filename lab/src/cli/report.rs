@@ -11,6 +11,7 @@ use vines::scene::Scene;
 
 use super::experiment::INTERRUPTED_FILE;
 use super::output::{Temporary, results, written};
+use super::shell::quoted;
 use super::summary::{ideal, parameters};
 use super::{Cli, dispatch};
 use super::{failure::Failure, options::SceneArguments, signals};
@@ -142,7 +143,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         } else {
             line.into()
         };
-        let shown = words(arguments, &line, &arguments.out).join(" ");
+        let shown: Vec<String> = words(arguments, &line, &arguments.out)
+            .iter()
+            .map(|word| quoted(word))
+            .collect();
+        let shown = shown.join(" ");
         super::say(&shown);
         let command = Cli::try_parse_from(words(arguments, &line, new.path())).map_err(Failure::input)?;
         let (mut text, failure) = match dispatch(command.command) {

@@ -41,12 +41,21 @@ pub(super) fn man(arguments: &ManArguments) -> Result<String, Failure> {
     Ok(String::from_utf8_lossy(&page).into_owned())
 }
 
+/// A word as a shell needs it: in single quotes, unless it has only characters that no shell reads otherwise.
+pub(super) fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./:=,+@%±".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.into(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
 /// The error of the command line, with what to do: of a command that does not exist the list of those that do, of a scene its option.
 pub(super) fn with_advice(mut error: clap::Error) -> clap::Error {
     let advice = match (error.kind(), error.get(ContextKind::InvalidArg)) {
         (ErrorKind::InvalidSubcommand, _) => commands(),
         (ErrorKind::UnknownArgument, Some(ContextValue::String(file))) if file.ends_with(".toml") => {
-            format!("a scene has an option: --scene {file}")
+            format!("a scene has an option: --scene {}", quoted(file))
         }
         _ => return error,
     };

@@ -99,6 +99,7 @@ pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
             places(stable)
         ),
         Reason::Coexists { stable, regime: Regime::Symmetric } => places(stable),
+        Reason::CutOff { stable } => format!("the limit cut the motion off before it settled; {}", places(stable)),
         Reason::Coexists { stable, regime } => format!(
             "the motion is {}, and coexists with the wanted one: {}. Try another G or another [start]",
             regime.name(),

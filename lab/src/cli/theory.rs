@@ -13,7 +13,10 @@ use vines::{
 
 use super::output::{Results, output, writable};
 use super::summary::parameters;
-use super::{failure::Failure, options::SceneArguments};
+use super::{
+    failure::Failure,
+    options::{SceneArguments, positive_frequency},
+};
 
 const HELP: &str = "\
 Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold
@@ -54,10 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     writable(&arguments.figure)?;
     let scene = arguments.scene.load_for("theory is")?.dimensionless();
     let flow = SlowFlow::new(scene.lambda, scene.r);
-    if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
-        return Err(Failure::input(format!(
-            "--sigma = {sigma} (dimensionless) is not a finite number"
-        )));
+    if let Some(sigma) = arguments.sigma {
+        positive_frequency("--sigma", &scene, sigma)?;
     }
     let solutions = resonant(&scene);
     let stable = solutions.iter().find(|point| point.stable());

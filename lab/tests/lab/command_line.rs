@@ -101,7 +101,8 @@ fn input_without_sense_ends_with_one_message_and_code_two_and_without_a_result_w
         ("man dance", 2, "commands are identify, backbone, fit"),
         ("check rig.toml", 2, "--scene rig.toml"),
         ("rig --listen 127.0.0.1:0 --sessions 0", 2, "1.."),
-        ("orbit --sigma=-1000", 2, "above 0"),
+        ("orbit --sigma=-1000", 2, "above -1/epsilon = -118.9"),
+        ("theory --sigma=-200", 2, "above -1/epsilon = -118.9"),
         ("orbit --sigma=-1 --set=excitation.G=0.6", 1, "vines map"),
         ("orbit --response --set=excitation.G=0", 1, "G = 0"),
         ("identify --rig built-in --set=excitation.G=0", 2, "no drive"),
@@ -224,6 +225,60 @@ fn a_map_is_written_as_table_and_figures() {
     assert!(rows.starts_with("sigma,G,r,regime,followed,transient,recurrence,exponent,exponent_error,synchrony,"));
     let curves = read("bifurcations.csv");
     assert!(curves.starts_with("curve,bifurcation,sigma,G,C,B,bounds_stability\n") && curves.lines().count() > 20);
+}
+
+#[test]
+fn a_check_states_nothing_more_certain_than_a_point() {
+    let checked = json("check --json");
+    let linear = &checked["linear"];
+    let number = |key: &str| linear[key].as_f64().unwrap();
+    // 1e-4 of the half-power bandwidth.
+    let least = 2e-4 * number("zeta");
+    for (u, of) in [("u_f0_Hz", number("f0_Hz")), ("u_zeta", 1.0)] {
+        assert!((0.99..1.1).contains(&(number(u) / of / least)), "{u}: {linear}");
+    }
+    for quantity in checked["quantities"].as_array().unwrap() {
+        assert!(quantity["uncertainty"].as_f64().unwrap() > 1e-6, "{quantity}");
+    }
+}
+
+#[test]
+fn a_backbone_that_a_limit_cuts_off_is_said_to_be_cut_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display();
+    let low = "backbone --set phase_lock.response_max=0.003 --set backbone.C_from=0.2";
+    let part = "the limit cut the motion off before it settled; at this G, the stable symmetric 1:1 motion is at sigma";
+    fails(&format!("{low} --out {out}"), 1, part);
+}
+
+#[test]
+fn units_that_no_rig_has_are_named_with_the_values_and_what_is_plausible() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display();
+    assert!(
+        vines(&format!("backbone --set backbone.points=8 --out {out}"))
+            .status
+            .success()
+    );
+    let mm = "--column E=E_m:mm --column u_E=u_E_m:mm";
+    for (option, code, part) in [
+        (mm, 1, "point 1: at phase resonance a response of 6.999"),
+        (mm, 1, "and this one is 1.1812e-7 m: give the units of both"),
+        ("--column A=A_m:km", 2, "the unit km is unknown"),
+        (
+            "--column E=E_m:cm --column u_E=u_E_m:cm",
+            1,
+            "are the units right? Point 1 was read as 8.7489 Hz",
+        ),
+        ("--known b=10", 1, "b = 10.000 m: is this meant? --known has"),
+        ("--known m=32", 1, "epsilon = m/M = 8.406: is this meant? --known has"),
+        ("--known q=1", 2, "theta, k_r, v_y, h, g\n"),
+    ] {
+        let output = vines(&format!("fit {out}/tracked.csv {option} {ONLY_IDEAL}"));
+        assert_eq!(output.status.code(), Some(code), "{output:?}");
+        assert!(text(&output).contains(part), "{option}: {}", text(&output));
+        assert!(!text(&output).contains("NaN"), "{option}: {}", text(&output));
+    }
 }
 
 /// What excludes all hypotheses but an ideal cavity.

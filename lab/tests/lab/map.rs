@@ -54,6 +54,8 @@ fn a_map_that_makes_no_sense_is_refused_with_the_value_that_is_wrong() {
         ("--y plant.epsilon=0.001:0.01:3", "mixes SI keys"),
         ("--periods 3", "3 periods: from 100 to"),
         ("--x sigma=-200:1:3", "above 0"),
+        ("--x chain.snr=20:60:3", "chain.snr: a regime map does not depend on it"),
+        ("--y plant.mu_k=0:0.1:3", "may be sigma, G or excitation.E, r"),
     ] {
         fails(&format!("map --out /proc/map {options}"), 2, part);
     }

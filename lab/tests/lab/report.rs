@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::{text, vines, words};
+use crate::{Running, text, vines, words};
 
 /// The page of a scene with few levels, on a coarse map.
 fn report(folder: &Path) -> String {
@@ -75,15 +75,22 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
 #[test]
 fn a_report_says_which_commands_failed_and_shows_why() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().display();
+    let out = folder.path().join("of today");
+    let out = out.to_str().unwrap();
     let idle = "--set start.dq2=0 --set phase_lock.acquire_timeout=3 --x sigma=-2:1:3 --y G=0.8:1.8:3";
-    let done = vines(&format!("report {idle} --out {out}"));
+    let line = format!("report {idle} --out");
+    let done = Running::start(&[words(&line), vec![out]].concat()).output();
     assert_eq!(done.status.code(), Some(1));
     assert!(
         text(&done).contains("error: without a result: Lock and free decay, "),
         "{}",
         text(&done)
     );
-    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    let html = std::fs::read_to_string(folder.path().join("of today/report.html")).unwrap();
     assert!(html.contains("error: no lock within"));
+    // As a shell needs it.
+    assert!(
+        html.contains(&format!("vines backbone --out '{out}' --set=start.dq2=0")),
+        "{html}"
+    );
 }

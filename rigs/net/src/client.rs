@@ -126,7 +126,8 @@ impl Client {
                 Some(Ok(frame)) if frame.session != self.session => self.counters.foreign += 1,
                 Some(Ok(frame)) if frame.kind == Kind::Text => self.message.take(&frame),
                 Some(Ok(frame)) if frame.kind == Kind::Refusal => {
-                    return Err(match Refusal::read(&frame) {
+                    // Of the sample time the server refuses a Hello, which states it.
+                    return Err(match Refusal::read(&frame, self.last.values[0]) {
                         Refusal::Failed { bytes } => {
                             let message = self.message.text(bytes);
                             LinkError::Failed { peer, time: frame.time, message }

@@ -304,9 +304,9 @@ pub enum Refusal {
     /// 1
     #[error("it has another client; sessions are served one at a time")]
     Busy,
-    /// 2: the sample time of the server, s.
-    #[error("its sample time is {0} s, which differs from that of this program: use the same scene for both")]
-    SampleTime(f64),
+    /// 2: the sample times of server and client, s.
+    #[error("its sample time is {server} s, and that of this program {client} s: use the same scene for both")]
+    SampleTime { server: f64, client: f64 },
     /// 3
     #[error("it is a rig where a controller is needed, or the reverse")]
     Role,
@@ -336,7 +336,7 @@ impl Refusal {
     pub(crate) fn answer(self, cause: &Frame) -> Frame {
         let [code, first, value, limit] = match self {
             Self::Busy => [1.0, 0.0, 0.0, 0.0],
-            Self::SampleTime(seconds) => [2.0, seconds, 0.0, 0.0],
+            Self::SampleTime { server, .. } => [2.0, server, 0.0, 0.0],
             Self::Role => [3.0, 0.0, 0.0, 0.0],
             Self::Version(version) => [4.0, version.into(), 0.0, 0.0],
             Self::Drive { index, value, limit } => [5.0, index as f64, value, limit],
@@ -349,11 +349,12 @@ impl Refusal {
         Frame { flags: 0, kind, values, ..*cause }
     }
 
-    pub(crate) fn read(frame: &Frame) -> Self {
+    /// Reads a frame; `step`: the sample time of the client, s.
+    pub(crate) fn read(frame: &Frame, step: f64) -> Self {
         let [code, first, value, limit, ..] = frame.values;
         match code as u8 {
             1 => Self::Busy,
-            2 => Self::SampleTime(first),
+            2 => Self::SampleTime { server: first, client: step },
             3 => Self::Role,
             4 => Self::Version(first as u16),
             5 => Self::Drive { index: first as usize, value, limit },
@@ -452,7 +453,7 @@ mod tests {
         for message in [limit, &"µ".repeat(MESSAGE), "short"] {
             let frames = write_failure(Frame::new(Kind::Hello, 1), message);
             let (refusal, parts) = frames.split_last().unwrap();
-            let Refusal::Failed { bytes } = Refusal::read(refusal) else {
+            let Refusal::Failed { bytes } = Refusal::read(refusal, 0.0) else {
                 panic!("{refusal:?}");
             };
             let mut arrived = Message::default();
@@ -523,7 +524,10 @@ mod tests {
                 Refusal::Drive { index: 2, value: 1.0, limit: 0.01 }.answer(&at),
                 0x02d2_922c,
             ),
-            (Refusal::SampleTime(1e-3).answer(&at), 0x0bb1_66c2),
+            (
+                Refusal::SampleTime { server: 1e-3, client: 2e-3 }.answer(&at),
+                0x0bb1_66c2,
+            ),
         ] {
             let bytes = frame.encode();
             assert_eq!(crc32fast::hash(&bytes[..CHECKSUM_AT]), checksum, "{frame:?}");

@@ -57,7 +57,8 @@ impl Service {
         }
         let difference = (hello.values[0] / self.sample_time - 1.0).abs();
         if difference.is_nan() || difference > SAME_TIME {
-            return Err(Refusal::SampleTime(self.sample_time));
+            let (server, client) = (self.sample_time, hello.values[0]);
+            return Err(Refusal::SampleTime { server, client });
         }
         let mut welcome = Frame { flags, ..Frame::new(Kind::Welcome, hello.session) };
         welcome.values[..3].copy_from_slice(&[self.sample_time, self.silence, channels.into()]);

@@ -105,7 +105,10 @@ impl File<'_> {
         let motions = Measurand::ALL.map(Measurand::unit);
         let mut response = self.measured(response, "response", &motions, &mut units)?;
         let mut drive = self.drive(selection, &response, &mut units)?;
-        let time = self.time(selection, &mut notes)?;
+        let mut time = self.time(selection, &mut notes)?;
+        if let Some(time) = &mut time {
+            notes.extend(self.without_copies([time, &mut response, &mut drive]));
+        }
         let [start, sample_time] = match (&time, selection.rate, response.clock) {
             (Some(time), rate, _) => self.fitted(time, rate, [&mut response, &mut drive], &mut notes)?,
             (None, None, None) => {
@@ -374,6 +377,31 @@ impl File<'_> {
             return Ok(None);
         };
         Ok(Some(self.measured(text, "time", &["s"], notes)?))
+    }
+
+    /// Leaves out rows that repeat the row before them, if every row that repeats a time does so: a clock that is rounded repeats times, too. Returns what to
+    /// say of it.
+    fn without_copies(&self, channels: [&mut Channel; 3]) -> Option<String> {
+        let equals = |channel: &Channel, n: usize| channel.values.get(n - 1) == channel.values.get(n);
+        let count = channels[0].values.len();
+        let copies: Vec<usize> = (1..count).filter(|n| equals(channels[0], *n)).collect();
+        let (first, are_copies) = (*copies.first()?, |channel: &&mut Channel| {
+            copies.iter().all(|n| equals(channel, *n))
+        });
+        if !channels.iter().all(are_copies) || channels.iter().any(|one| one.values.len() != count) {
+            return None;
+        }
+        for channel in channels {
+            let values = channel.values.iter().enumerate();
+            let values = values.filter(|(n, _)| copies.binary_search(n).is_err());
+            channel.values = values.map(|(_, value)| *value).collect();
+        }
+        Some(format!(
+            "{}: rows that repeat time and values of the row before are left out: {}, the first one in {}",
+            self.origin,
+            copies.len(),
+            self.place(first)
+        ))
     }
 
     /// Start and step of the clock that fits the times. Samples at uneven times are interpolated.

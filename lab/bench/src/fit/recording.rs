@@ -3,7 +3,7 @@
 //! The curve is that of [`vines_identify::identify`]: held levels, sweeps and decays are one case, and the phase does not matter. Before that, the
 //! channels are made displacements, and what is no measurement of a rig near resonance is refused.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 use std::fmt::{self, Display, Formatter};
 
 use nalgebra::DVector;
@@ -107,12 +107,9 @@ const COARSEST: f64 = 12.0;
 /// Fewest periods of a decay, and periods of the pieces whose damping is compared.
 const FEWEST_OF_DECAY: usize = 8;
 /// Smallest damping ratio of a structure.
-const LEAST_DAMPING: f64 = 1e-5;
+pub(super) const LEAST_DAMPING: f64 = 1e-5;
 /// Largest share of the response that a base at rest would make at resonance.
 const RESTS: f64 = 0.02;
-/// Share of the samples at the same extreme value from which a channel is clipped: a sine that is sampled 100 times a period and rounded to 10
-/// bits has 4 %.
-const CLIPPED_SHARE: f64 = 0.06;
 /// Largest relative distance of the frequency from the natural frequency near resonance.
 const NEAR_RESONANCE: f64 = 0.2;
 /// Largest ratio of the damping in a piece of a linear decay to that of the whole, and of its inverse: impacts in 1:1 motion double the loss near the
@@ -225,6 +222,8 @@ impl Recording {
             value: value / self.sample_time,
             uncertainty: u / self.sample_time,
         };
+        // As of a stated point: of the half-power bandwidth.
+        let u = u.hypot(POINT_RESOLUTION * 2.0 * -pole.re);
         let (omega, rate) = (estimate(pole.norm(), u.hypot(changed)), estimate(-pole.re, u));
         Ok(Some(LinearDecay { omega, zeta: rate.scaled(1.0 / omega.value) }))
     }
@@ -275,13 +274,21 @@ impl Recording {
                     ", channel {channel} is constant: is it connected, and is it the right one?"
                 ));
             }
-            for value in [low, high] {
-                let share = values.iter().filter(|sample| **sample == value).count() as f64 / count as f64;
-                if share > CLIPPED_SHARE && value != 0.0 {
+            let rounding = rounding(values);
+            for value in [low, high].into_iter().filter(|_| low < high) {
+                if let Some((sample, [from, to])) = glitch(values, value, rounding) {
                     return refused(format!(
-                        ", channel {channel} is clipped: {:.1} % of its samples are equal to its largest or smallest value, {value:e} {}; reduce the \
-                         gain, and record again",
-                        100.0 * share,
+                        ", channel {channel}: sample {} ({:.4} s) is {value:.4e} {unit}, and all others are from {from:.4e} to {to:.4e} {unit}: no oscillation \
+                         has such a sample; repair it, or cut the recording there",
+                        sample + 1,
+                        sample as f64 * sample_time,
+                        unit = measurand.unit()
+                    ));
+                }
+                if let Some(stay) = clipped(values, value, rounding) {
+                    return refused(format!(
+                        ", channel {channel} is clipped: it stays at {value:.4e} {} for {stay:.1} samples at a time, longer than a smooth peak; reduce \
+                         the gain, and record again",
                         measurand.unit()
                     ));
                 }
@@ -414,6 +421,39 @@ impl Recording {
         let centred: Vec<f64> = self.response.iter().map(|value| value - middle).collect();
         Line::strongest(&centred).turn / (TAU * self.sample_time)
     }
+}
+
+/// The step to which values are rounded: the smallest distance between two of them.
+fn rounding(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
+    steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min)
+}
+
+/// The sample with this extreme value, and the range of all others, if it is farther from the middle of its neighbours than that range and a rounding: an
+/// oscillation of any frequency up to half the sampling rate is not.
+fn glitch(values: &[f64], extreme: f64, rounding: f64) -> Option<(usize, [f64; 2])> {
+    let others = values.iter().copied().filter(|value| *value != extreme);
+    let (low, high) = range((f64::INFINITY, f64::NEG_INFINITY), others);
+    let at = values.iter().position(|value| *value == extreme)?;
+    let [before, after] = [at.checked_sub(1), Some(at + 1)].map(|n| values.get(n?));
+    let middle = mean(before.into_iter().chain(after).copied());
+    ((extreme - middle).abs() > high - low + rounding).then_some((at, [low, high]))
+}
+
+/// Mean number of samples for which values stay at their extreme, if that is longer than a smooth peak stays there. Rounding puts at most its last step
+/// into the extreme value. A parabola stays √2 times as long within the last two steps.
+fn clipped(values: &[f64], extreme: f64, rounding: f64) -> Option<f64> {
+    let is_near = |value: &f64| (value - extreme).abs() < 1.5 * rounding;
+    let stays = values.chunk_by(|one, other| is_near(one) == is_near(other));
+    let stays = stays.map(|stay| [stay.iter().filter(|value| **value == extreme).count(), stay.len()]);
+    let stays: Vec<_> = stays.filter(|[at, _]| *at > 0).collect();
+    let [at, near] = [0, 1].map(|n| mean(stays.iter().map(|stay| stay[n] as f64)));
+    // A channel may be held for some samples.
+    let mut held: Vec<usize> = values.chunk_by(|one, other| one == other).map(<[f64]>::len).collect();
+    held.sort_unstable();
+    (at > near / SQRT_2 + held[held.len() / 2] as f64).then_some(at)
 }
 
 /// Removes what changes slowly: running means over a period of the natural frequency, three times, which the oscillation does not pass, and over

@@ -217,6 +217,7 @@ impl Curve {
             particle: ParticleState::Unknown,
             shaker: Some(path),
         }
+        .stated()
     }
 }
 

@@ -165,7 +165,11 @@ fn another_role_another_sample_time_and_other_sensors_are_refused() {
     for (error, reason, part) in [
         (connect(peer.address, step), Refusal::Role, role),
         (controller, Refusal::Role, role),
-        (other, Refusal::SampleTime(step), "same scene"),
+        (
+            other,
+            Refusal::SampleTime { server: step, client: 2.0 * step },
+            "s, and that of this program 0.00226",
+        ),
     ] {
         assert_eq!(refused(&error), reason);
         assert!(error.to_string().contains(part), "{error}");
