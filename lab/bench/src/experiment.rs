@@ -104,87 +104,39 @@ fn unmet_in_words(unmet: Option<&str>) -> String {
     })
 }
 
-/// What a search for the requested drive has found.
+/// What a search for the requested drive has found. Responses are displacements at the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchFound {
-    /// Least and largest C of the response that was tried.
-    pub tried: [f64; 2],
-    /// Whether impacts have begun.
-    pub impacts: bool,
-    /// Least and largest G at which a symmetric 1:1 motion was held, and G, C and sigma where G was nearest to the requested one; `None` without one.
-    pub held: Option<([f64; 2], [f64; 3])>,
-    /// Largest G that was allowed.
-    pub strongest: f64,
-    /// Requested G.
-    pub requested: f64,
+    /// Least and largest response that was tried.
+    pub tried: [Quantity; 2],
+    /// Response and drive of the symmetric motion whose drive was nearest to the requested one; `None` without one.
+    pub nearest: Option<[Quantity; 2]>,
+    /// Requested drive.
+    pub requested: Quantity,
     /// Whether the time ended first.
     pub late: bool,
-    /// Half-width of the drawing as a displacement at the sensor, m, if the rig does not report impacts: nothing is then said of a particle.
-    pub silent: Option<f64>,
-}
-
-impl SearchFound {
-    /// The requested drive as G, unless the rig does not report impacts.
-    fn requested_in_words(&self) -> String {
-        self.silent
-            .map_or_else(|| format!(", G = {:.4}", self.requested), |_| String::new())
-    }
-
-    /// What was found on a rig that does not report impacts, in m. `b`: the length of one in C.
-    fn without_impacts(&self, b: f64) -> String {
-        let [low, high] = self.tried.map(|c| short(c * b));
-        let tried = format!("at responses from {low} to {high} m ");
-        match (self.held, self.impacts) {
-            (None, _) if self.late => {
-                tried + "no motion was steady and nonlinear yet. Allow more time (phase_lock.acquire_timeout)"
-            }
-            (None, false) => {
-                tried
-                    + "the motion stayed near the linear response. Allow a larger drive (phase_lock.amplitude_max), or track it with `vines backbone`"
-            }
-            (None, true) => {
-                tried + "no motion was steady and nonlinear. Try another drive, or track it with `vines backbone`"
-            }
-            (Some((_, [_, c, _])), _) => format!(
-                "{tried}the drive was nearest to the requested one at a response of {} m. Allow more time (phase_lock.acquire_timeout), or try \
-                 another drive",
-                short(c * b)
-            ),
-        }
-    }
 }
 
 impl Display for SearchFound {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        if let Some(b) = self.silent {
-            return f.write_str(&self.without_impacts(b));
-        }
         let [low, high] = self.tried;
-        let Some(([least, largest], [g, c, sigma])) = self.held else {
-            write!(f, "at responses from C = {low:.3} to {high:.3} ")?;
-            return match (self.impacts, self.late) {
-                (_, true) => {
-                    f.write_str("no motion was symmetric 1:1 yet. Allow more time (phase_lock.acquire_timeout)")
-                }
-                (true, _) => f.write_str("impacts began, but no motion was symmetric 1:1. Try another G"),
-                (false, _) => write!(
+        write!(f, "of responses from {low} to {high} ")?;
+        match self.nearest {
+            None => f.write_str("none was symmetric and nonlinear")?,
+            Some([response, drive]) => {
+                let share = short(drive.value / self.requested.value);
+                write!(
                     f,
-                    "no impacts began, with drives up to G = {:.2}. Give the particle a velocity (start.dq2), or allow a larger drive \
-                     (phase_lock.amplitude_max, which a converter's chain.base_range bounds)",
-                    self.strongest
-                ),
-            };
-        };
-        write!(
-            f,
-            "with the response under control, the motion was symmetric 1:1 at drives from G = {:.4} to {largest:.4}, nearest at G = {g:.4}, \
-             C = {c:.4}, sigma = {sigma:.4}; ",
-            least.max(0.0)
-        )?;
-        f.write_str(match self.late {
-            true => "the time ended on the way. Allow more (phase_lock.acquire_timeout)",
-            _ if (least..=largest).contains(&self.requested) => "nearer it was lost. Try another G",
-            _ => "beyond it was lost. Ask for a G well within this range",
+                    "that of {response} had the nearest drive, {drive}, {share} times the requested one"
+                )?;
+            }
+        }
+        f.write_str(match (self.late, self.nearest) {
+            (true, _) => "; the time was over (phase_lock.acquire_timeout)",
+            (_, None) => {
+                ". A particle at rest needs a velocity (start.dq2) or a larger drive (phase_lock.amplitude_max, chain.base_range)"
+            }
+            (_, Some(_)) => "; beyond it the motion was lost. `vines backbone` tracks the drives that hold one",
         })
     }
 }
@@ -251,7 +203,7 @@ pub enum ExperimentError {
         /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
         unmet: Option<String>,
     },
-    #[error("no lock within {periods:.0} periods at the requested drive{}: {found}", found.requested_in_words())]
+    #[error("no lock within {periods:.0} periods at the requested drive of {}: {found}", found.requested)]
     NotReached { periods: f64, found: Box<SearchFound> },
     #[error("no lock: the motion, held at a response of {response:.4e} for {periods} periods, is not steady: {why}")]
     NotSteady {

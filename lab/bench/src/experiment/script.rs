@@ -81,11 +81,8 @@ pub(crate) struct Script<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     moving: Held,
     /// The levels so far.
     pub levels: Vec<Held>,
-    /// Smallest and largest response of the legs, m, whether impacts have begun, smallest and largest drive that held a symmetric motion, m, and the
-    /// symmetric leg with the drive nearest to the requested one.
+    /// Smallest and largest response of the legs, m, and the symmetric leg with the drive nearest to the requested one.
     tried: (f64, f64),
-    impacts: bool,
-    drives: (f64, f64),
     nearest: Option<Held>,
 }
 
@@ -101,8 +98,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             moving: [0.0; 3],
             levels: Vec::new(),
             tried: (f64::INFINITY, 0.0),
-            impacts: false,
-            drives: (f64::INFINITY, 0.0),
             nearest: None,
         }
     }
@@ -266,7 +261,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             *leg = self.measure(FOLLOWED, true)?;
         }
         let is_there = (leg.last / self.setpoint - 1.0).abs() < LEG_CHANGE;
-        self.impacts |= is_there && has_impacts(leg.regime);
         Ok(is_there && is_kind(self, leg.regime))
     }
 
@@ -578,22 +572,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             omega: omega.value,
             regime: regime_of_leg(samples, self.knowledge, [fit.response, drive, omega], is_at_rest),
         };
-        self.note(&leg, fit.unsteady().is_none());
-        Ok(leg)
-    }
-
-    /// Notes a leg, for the next move and for the words of a search without a result.
-    fn note(&mut self, leg: &Leg, is_explained: bool) {
         self.moving = [leg.response, leg.drive, leg.omega];
         self.levels.clear();
         self.tried = range(self.tried, [leg.response]);
-        // What noise does not explain may resemble impacts.
-        self.impacts |= is_explained && has_impacts(leg.regime);
+        Ok(leg)
     }
 
     /// Notes where the motion is the one that is wanted.
     fn note_held(&mut self, held: Held) {
-        self.drives = range(self.drives, [held[1]]);
         let distance = |held: &Held| (held[1] - self.requested).abs();
         if self.nearest.is_none_or(|nearest| distance(&held) < distance(&nearest)) {
             self.nearest = Some(held);
@@ -602,26 +588,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
 
     /// The requested drive was not reached; `late`: because the time is over.
     fn not_reached(&self, late: bool) -> ExperimentError {
-        let d = self.knowledge.numbers;
-        let is_silent = self
-            .run
-            .samples
-            .last()
-            .is_some_and(|sample| sample.ground_truth.is_none());
-        let of = |[response, drive, omega]: Held| [d.excitation(drive), response / d.b, d.sigma(omega)];
+        let units = &self.knowledge.target.units;
         let found = SearchFound {
-            tried: [self.tried.0, self.tried.1].map(|response| response / d.b),
-            impacts: self.impacts,
-            held: self.nearest.map(|held| {
-                (
-                    [self.drives.0, self.drives.1].map(|drive| d.excitation(drive)),
-                    of(held),
-                )
-            }),
-            strongest: d.excitation(self.largest(0.0)),
-            requested: d.g,
+            tried: [self.tried.0, self.tried.1].map(|response| units.response.quantity(response)),
+            nearest: self
+                .nearest
+                .map(|[response, drive, _]| [units.response.quantity(response), units.reference.quantity(drive)]),
+            requested: units.reference.quantity(self.requested),
             late,
-            silent: is_silent.then(|| self.knowledge.target.units.response.of_metres(d.b)),
         };
         ExperimentError::NotReached { periods: self.run.periods, found: found.into() }
     }

@@ -90,7 +90,8 @@ impl Deref for File<'_> {
 }
 
 impl File<'_> {
-    fn recording(&self, selection: &Selection) -> Result<Recording, RecordingError> {
+    /// Refuses a rate or a delay that is none.
+    fn checked(&self, selection: &Selection) -> Result<(), RecordingError> {
         if selection.rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
             let rate = selection.rate.unwrap_or_default();
             return Err(self.refused(&format!(": the rate is {rate} samples a second; it must be above 0")));
@@ -100,6 +101,11 @@ impl File<'_> {
                 ": the base is {late} s later; this must be a finite time in s"
             )));
         }
+        Ok(())
+    }
+
+    fn recording(&self, selection: &Selection) -> Result<Recording, RecordingError> {
+        self.checked(selection)?;
         let response = selection.response.as_deref().unwrap_or("response");
         let (mut notes, mut units) = (Vec::new(), Vec::new());
         let motions = Measurand::ALL.map(Measurand::unit);
