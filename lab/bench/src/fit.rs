@@ -21,8 +21,9 @@ use crate::identification::ResonancePoint;
 
 pub use channels::Selection;
 pub use recording::{LinearDecay, Recording, RecordingError, Stretch};
-pub use vines_estimate::CALIBRATION;
 
+/// Standard uncertainty of the gain of a reference that was calibrated as usual, relative.
+pub const CALIBRATION: f64 = 0.01;
 /// Probability of a larger rise of chi-square below which a state of the particle does not agree with a linear response.
 const DISAGREES: f64 = 0.01;
 

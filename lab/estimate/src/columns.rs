@@ -58,9 +58,8 @@ struct Place {
     speed: f64,
     local: Local,
     lag: Complex64,
-    /// Weights of the force before, of S before and of S here in the force here, and those of the element's own lag.
+    /// Weights of the force before, of S before and of S here in the force here.
     weights: [Complex64; 3],
-    own: [Complex64; 3],
 }
 
 /// Weights of `lag d' + d = S` over a step, with S a straight line.
@@ -75,16 +74,12 @@ fn weights(step: f64, lag: Complex64) -> [Complex64; 3] {
 }
 
 /// The force of a steady one that varies along the path.
-fn follow(
-    places: &[Place],
-    weights: impl Fn(&Place) -> [Complex64; 3],
-    steady: impl Fn(usize) -> Complex64,
-) -> Vec<Complex64> {
+fn follow(places: &[Place], steady: impl Fn(usize) -> Complex64) -> Vec<Complex64> {
     let (mut before, mut force) = (steady(0), steady(0));
     let mut forces = vec![force];
     for (k, place) in places.iter().enumerate().skip(1) {
         let here = steady(k);
-        let [decay, then, now] = weights(place);
+        let [decay, then, now] = place.weights;
         force = decay * force + then * before + now * here;
         before = here;
         forces.push(force);
@@ -117,18 +112,17 @@ fn places(record: &Record, force: &Force, path: &Path) -> Vec<Place> {
             local: force.basis.at(logarithm.re),
             lag,
             weights: weights(1.0 / PARTS as f64, lag * force.lag),
-            own: weights(1.0 / PARTS as f64, lag),
         }
     };
     (0..time.len() - 1).flat_map(parts).chain(last).map(at).collect()
 }
 
-/// Force of the element's motion along the path less its steady force with its own lag; `None` where the motion is lost.
+/// Force of the element's motion along the path less its steady force with its lag; `None` where the motion is lost.
 fn beyond_lag(record: &Record, force: &Force, path: &Path, places: &[Place]) -> Vec<Option<Complex64>> {
     let Some(stretches) = force.element.along(path) else {
         return vec![Some(Complex64::ZERO); places.len()];
     };
-    let own = follow(places, |place| place.own, |k| force.element.steady(places[k].amplitude));
+    let own = follow(places, |k| force.element.steady(places[k].amplitude));
     let mut beyond = vec![None; places.len()];
     for stretch in stretches {
         let first = places.partition_point(|place| place.time < stretch[0].0);
@@ -157,18 +151,14 @@ impl Columns {
         let beyond = beyond_lag(record, force, &path, &places);
         let size = force.basis.size;
         let forces: Vec<Vec<Complex64>> = (0..size)
-            .map(|n| follow(&places, |place| place.weights, |k| value(&places[k].local, n).into()))
+            .map(|n| follow(&places, |k| value(&places[k].local, n).into()))
             .collect();
         let sum = |k: usize| -> Complex64 { (0..size).map(|n| force.coefficients[n] * forces[n][k]).sum() };
         let sums: Vec<Complex64> = (0..places.len()).map(sum).collect();
-        let lags = follow(
-            &places,
-            |place| place.weights,
-            |k| match places[k].lag {
-                Complex64::ZERO => Complex64::ZERO,
-                _ => -(places[k].local.sum(force.coefficients) - sums[k]) / force.lag,
-            },
-        );
+        let lags = follow(&places, |k| match places[k].lag {
+            Complex64::ZERO => Complex64::ZERO,
+            _ => -(places[k].local.sum(force.coefficients) - sums[k]) / force.lag,
+        });
         // Known, spline, gain, lag: as forces in the frame.
         let row = |k: usize| -> Vec<Complex64> {
             let turn = places[k].turn * places[k].speed.powi(record.power);

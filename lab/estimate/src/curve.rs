@@ -25,8 +25,8 @@ pub struct Curve {
     pub coefficients: Vec<Complex64>,
     /// Covariance of their real and imaginary parts.
     pub covariance: DMatrix<f64>,
-    /// Rows, of variance 1, of what the record says, without any prior, of the coefficients and of the share by which the base moves more than its
-    /// reference reads. The curve is that of a reference that reads what moves.
+    /// Rows, of variance 1, of what the record says of the coefficients without any prior, for a share by which the base moves more than its reference
+    /// reads. The curve is that of a reference that reads what moves.
     pub information: DMatrix<f64>,
     /// The measured values of these rows.
     pub expected: DVector<f64>,
@@ -108,7 +108,7 @@ impl Curve {
     }
 
     /// The curve as it is stated: beside noise, drive and amplitude have a relative standard uncertainty of `share`, and the frequency that share of the
-    /// half-power bandwidth. The errors of the functions are independent. The gain of the reference has that of the drive. `None` where rounding leaves no covariance.
+    /// half-power bandwidth. The errors of the functions are independent. `None` where rounding leaves no covariance.
     pub fn resolved(mut self, share: f64) -> Option<Self> {
         // The amplitude at which each function counts most.
         let amplitudes: Vec<f64> = self.basis.spread(self.basis.size).map(f64::exp).collect();
@@ -123,11 +123,11 @@ impl Curve {
             };
             (share * of).powi(2)
         };
-        let of_gain = |n: usize| if n == size { share * share } else { variance(n) };
-        let floor = DMatrix::from_diagonal(&DVector::from_fn(size + 1, |n, _| of_gain(n)));
-        self.covariance += floor.view((0, 0), (size, size));
+        let floor = DMatrix::from_diagonal(&DVector::from_fn(size, |n, _| variance(n)));
+        self.covariance += &floor;
+        let of_the_force = self.information.columns(0, size);
         let rows = self.information.nrows();
-        let of_rows = DMatrix::identity(rows, rows) + &self.information * floor * self.information.transpose();
+        let of_rows = DMatrix::identity(rows, rows) + of_the_force * floor * of_the_force.transpose();
         let whitened = of_rows.cholesky()?.l();
         self.information = whitened.solve_lower_triangular(&self.information)?;
         self.expected = whitened.solve_lower_triangular(&self.expected)?;

@@ -17,8 +17,6 @@ const FUNCTIONS: usize = 23;
 const U_LAG: f64 = 0.02;
 /// Share of a sample through which a base holds its amplitude, and its standard uncertainty: all of it in a simulation, none on a smooth base.
 const HELD: (f64, f64) = (0.5, 0.5);
-/// Standard uncertainty of the gain of a reference that was calibrated as usual, relative.
-pub const CALIBRATION: f64 = 0.01;
 /// Information on u at the start: none, but for rounding. Its inverse is that on what is exact.
 const START_INFORMATION: f64 = 1e-30;
 /// Uncertainty of the curvature of an element's own force, relative: what the uncertainties of a drawing move it by.
@@ -49,8 +47,6 @@ pub struct Estimate<'a> {
     own: Vec<Complex64>,
     /// Smallest roughness of the deviation, over the scale.
     least: f64,
-    /// Whether the reference reads the motion of the base exactly.
-    is_calibrated: bool,
     columns: Columns,
 }
 
@@ -119,7 +115,6 @@ impl<'a> Estimate<'a> {
             hyper,
             own,
             least,
-            is_calibrated: false,
             columns,
         })
     }
@@ -132,7 +127,6 @@ impl<'a> Estimate<'a> {
             direct[1 + FUNCTIONS] = Complex64::ZERO;
             direct[4 + FUNCTIONS] = Complex64::ZERO;
         }
-        self.is_calibrated = true;
         self
     }
 
@@ -153,17 +147,10 @@ impl<'a> Estimate<'a> {
         let first = 2 * self.basis.size;
         let (mut normal, mut known) = (information.clone(), right.column(0).into_owned());
         for (part, change) in [1.0 - self.lag.re, -self.lag.im].into_iter().enumerate() {
-            let is_free = part == 0 && !self.is_calibrated;
             // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
             let priors = [
-                (
-                    0.0,
-                    if is_free {
-                        CALIBRATION.powi(-2)
-                    } else {
-                        START_INFORMATION.recip()
-                    },
-                ),
+                // A reference that reads what moves; another gain is for a hypothesis.
+                (0.0, START_INFORMATION.recip()),
                 (change, U_LAG.powi(-2)),
                 (0.0, START_INFORMATION),
                 (if part == 0 { HELD.0 } else { 0.0 }, HELD.1.powi(-2)),
@@ -234,7 +221,6 @@ impl<'a> Estimate<'a> {
                 ([0.7, 0.33, 0.07], 40)
             };
             self.hyper = inside(&simplex(self.hyper.map(f64::ln), steps, cost, [0.02, 0.05], most));
-            self.is_calibrated = round + 1 == PATH_ROUNDS;
             let solution = self.solve(self.hyper)?;
             let unknowns = complex(&solution.unknowns);
             let (m, lag) = (self.basis.size, self.lag);
@@ -267,7 +253,7 @@ impl<'a> Estimate<'a> {
     pub fn curve(&self, solution: &Solution) -> Option<Curve> {
         let n = 2 * self.basis.size;
         let covariance = solution.normal.inverse().view((0, 0), (n, n)).into_owned();
-        let (information, expected) = solution.of_the_first(n + 1)?;
+        let (information, expected) = solution.of_the_first(n)?;
         Some(Curve {
             linear: self.record.linear,
             power: self.record.power,
@@ -281,23 +267,29 @@ impl<'a> Estimate<'a> {
 }
 
 impl Solution {
-    /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, and their values: the equations, without the
-    /// other unknowns.
+    /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, for every value of the next one, the gain of the
+    /// reference, and their values: the equations, without the other unknowns. The record's own evidence of the gain does not count: it comes from the
+    /// lag, which is that of an ideal element.
     fn of_the_first(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let (all, right) = &self.information;
-        let rest = all.nrows() - n;
+        let (first, rest) = (n + 1, all.nrows() - n - 1);
         // The others keep their prior, which the equations with it contain.
         let lower = self.normal.l();
-        let with_prior = (&lower * lower.transpose()).view((n, n), (rest, rest)).into_owned();
+        let with_prior = (&lower * lower.transpose())
+            .view((first, first), (rest, rest))
+            .into_owned();
         let inverse = with_prior.cholesky()?;
-        let cross = all.view((n, 0), (rest, n)).into_owned();
-        let matrix = all.view((0, 0), (n, n)) - cross.tr_mul(&inverse.solve(&cross));
-        let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&right.rows(n, rest).into_owned()));
-        let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, 30 * n)?;
+        let cross = all.view((first, 0), (rest, first)).into_owned();
+        let matrix = all.view((0, 0), (first, first)) - cross.tr_mul(&inverse.solve(&cross));
+        let known = right.rows(0, first) - cross.tr_mul(&inverse.solve(&right.rows(first, rest).into_owned()));
+        let eigen = SymmetricEigen::try_new(matrix.view((0, 0), (n, n)).into_owned(), f64::EPSILON, 30 * n)?;
         let largest = eigen.eigenvalues.max();
         let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > ROUNDING * largest).collect();
-        let row = |i: &usize| eigen.eigenvectors.column(*i).transpose() * eigen.eigenvalues[*i].sqrt();
-        let value = |i: &usize| eigen.eigenvectors.column(*i).dot(&known) / eigen.eigenvalues[*i].sqrt();
+        let row = |i: &usize| {
+            let (vector, root) = (eigen.eigenvectors.column(*i), eigen.eigenvalues[*i].sqrt());
+            (vector.transpose() * matrix.view((0, 0), (n, first))) / root
+        };
+        let value = |i: &usize| eigen.eigenvectors.column(*i).dot(&known.rows(0, n)) / eigen.eigenvalues[*i].sqrt();
         let rows: Vec<_> = kept.iter().map(row).collect();
         Some((
             DMatrix::from_rows(&rows),

@@ -28,7 +28,7 @@ mod search;
 mod windows;
 
 pub use curve::{Backbone, Curve, Resonance};
-pub use fit::{CALIBRATION, Estimate, Hyper, Solution};
+pub use fit::{Estimate, Hyper, Solution};
 pub use interpolation::{Basis, CubicSpline};
 pub use level::{Disturbance, Level, Motion};
 pub use linear::Linear;
