@@ -620,12 +620,12 @@ fn refusal(line: &str) -> String {
 
 #[test]
 fn a_refusal_gives_one_advice_and_it_follows_from_the_exact_orbits() {
-    // No time makes an orbit stable: they are stable for G from 0.959 to 1.414.
+    // No time makes an orbit stable: they are stable for G from 0.959 to 1.423.
     for drive in ["0.03", "0.3"] {
         let said = refusal(&format!(
             "--set start.dq2=0 --set excitation.G={drive} --set phase_lock.acquire_timeout=30"
         ));
-        assert!(said.contains("it is stable for G from 0.959 to 1.414"), "{said}");
+        assert!(said.contains("it is stable for G from 0.959 to 1.423"), "{said}");
     }
     // Where no orbit is stable at any drive, no other drive is asked for, and no range of them is named.
     let folder = tempfile::tempdir().unwrap();
