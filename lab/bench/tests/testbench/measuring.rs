@@ -183,7 +183,9 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
     let damped = at("plant.lambda=4.5 start.dq2=0 excitation.G=2 chain.adc_bits=12").unwrap_err();
     assert!(matches!(damped, ExperimentError::NotReached { .. }), "{damped}");
     assert!(
-        damped.to_string().contains("none was symmetric and nonlinear. A particle at rest needs"),
+        damped
+            .to_string()
+            .contains("none was symmetric and nonlinear. A particle at rest needs"),
         "{damped}"
     );
     // From the middle, impacts would begin at G = 4.5; a particle that moves needs less.
