@@ -1,7 +1,7 @@
 """Recordings as other programs write them, each made by a few lines, and what happens to them.
 
-`python python/tests/samples.py` writes validation/recordings.csv. With a number and a seed it reads so many damaged
-copies of the samples instead: every one must be read, or refused by a `ValueError` that names the file.
+Without arguments this writes validation/recordings.csv. With COUNT and SEED it reads COUNT damaged copies of the samples
+instead: every one must be read, or refused by a `ValueError` that names the file.
 """
 
 import csv

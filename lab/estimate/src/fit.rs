@@ -50,7 +50,8 @@ pub struct Estimate<'a> {
     columns: Columns,
 }
 
-/// The unknowns: spline, share by which the base moves more than the reference reads, lag, u at the start, and the share of a sample through which the base holds its amplitude, real and imaginary part of each.
+/// The unknowns, real and imaginary part of each: spline, share by which the base moves more than its reference reads, lag, u at the start, and the
+/// share of a sample through which the base holds its amplitude.
 pub struct Solution {
     /// Twice the negative logarithm of the likelihood, without constants.
     pub deviance: f64,
@@ -124,8 +125,10 @@ impl<'a> Estimate<'a> {
         self.own.fill(Complex64::ZERO);
         self.columns.feedback.iter_mut().for_each(|one| one.fill(0.0));
         for direct in &mut self.columns.direct {
-            direct[1 + FUNCTIONS] = Complex64::ZERO;
-            direct[4 + FUNCTIONS] = Complex64::ZERO;
+            // The gain of the reference, and what a held base changes.
+            for n in [self.columns.gain, self.columns.gain + 3] {
+                direct[n] = Complex64::ZERO;
+            }
         }
         self
     }
@@ -143,20 +146,19 @@ impl<'a> Estimate<'a> {
         let n = products.nrows() - 1;
         let information = products.view((1, 1), (n, n)).into_owned();
         let right = products.view((1, 0), (n, 1)).into_owned();
-        // The first of the unknowns that are not of the spline.
-        let first = 2 * self.basis.size;
+        let of_spline = 2 * self.basis.size;
         let (mut normal, mut known) = (information.clone(), right.column(0).into_owned());
         for (part, change) in [1.0 - self.lag.re, -self.lag.im].into_iter().enumerate() {
-            // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
             let priors = [
                 // A reference that reads what moves; another gain is for a hypothesis.
                 (0.0, START_INFORMATION.recip()),
                 (change, U_LAG.powi(-2)),
                 (0.0, START_INFORMATION),
+                // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
                 (if part == 0 { HELD.0 } else { 0.0 }, HELD.1.powi(-2)),
             ];
             for (n, (expected, information)) in priors.into_iter().enumerate() {
-                let place = first + 2 * n + part;
+                let place = of_spline + 2 * n + part;
                 normal[(place, place)] += information;
                 known[place] += expected * information;
             }
@@ -253,7 +255,7 @@ impl<'a> Estimate<'a> {
     pub fn curve(&self, solution: &Solution) -> Option<Curve> {
         let n = 2 * self.basis.size;
         let covariance = solution.normal.inverse().view((0, 0), (n, n)).into_owned();
-        let (information, expected) = solution.of_the_first(n)?;
+        let (information, expected) = solution.of_the_force(n)?;
         Some(Curve {
             linear: self.record.linear,
             power: self.record.power,
@@ -267,10 +269,9 @@ impl<'a> Estimate<'a> {
 }
 
 impl Solution {
-    /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, for every value of the next one, the gain of the
-    /// reference, and their values: the equations, without the other unknowns. The record's own evidence of the gain does not count: it comes from the
-    /// lag, which is that of an ideal element.
-    fn of_the_first(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    /// Rows of variance 1, and their values: what the record says of the first `n` unknowns, those of the spline, for a value of the next one, the gain
+    /// of the reference. They contain no prior of these, and the other unknowns are eliminated. What the record says of the gain alone does not count.
+    fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let (all, right) = &self.information;
         let (first, rest) = (n + 1, all.nrows() - n - 1);
         // The others keep their prior, which the equations with it contain.

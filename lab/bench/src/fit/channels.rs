@@ -90,7 +90,7 @@ impl Deref for File<'_> {
 }
 
 impl File<'_> {
-    /// Refuses a rate or a delay that is none.
+    /// Refuses a rate that is not above 0, and a delay that is not finite.
     fn checked(&self, selection: &Selection) -> Result<(), RecordingError> {
         if selection.rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
             let rate = selection.rate.unwrap_or_default();
