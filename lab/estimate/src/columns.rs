@@ -4,13 +4,12 @@
 //! u' = (pole - i omega0) u + gain (psi'/omega0)^power d exp(i psi),      lag d' + d = S(A)
 //! ```
 //!
-//! with the path `A exp(i psi)`. The unknowns are the coefficients of the spline S, the gain of the reference, a factor of the lag, and u at the start. An error of the path
+//! with the path `A exp(i psi)`. The unknowns are the coefficients of the spline S, a factor of the lag, and u at the start. An error of the path
 //! turns and changes the force, which moves u: `feedback` contains it to first order, with the force following at once.
 
 use nalgebra::{Matrix2, Vector2};
 use num_complex::Complex64;
 
-use crate::filter::pair;
 use crate::interpolation::{Basis, Local, gradient};
 use crate::record::{Element, Path, Record};
 
@@ -27,10 +26,8 @@ pub struct Columns {
     pub direct: Vec<Vec<Complex64>>,
     /// Growth of u by an error of u at the period before.
     pub feedback: Vec<Matrix2<f64>>,
-    /// u on the path, for a reference that reads what moves.
+    /// u on the path.
     pub path: Vec<Complex64>,
-    /// The place of the reference's gain among the unknowns, counted from 1.
-    pub gain: usize,
     /// Mean square of the force beyond its lag, m², from each period to the next one.
     pub beyond: Vec<f64>,
     /// Periods in which the element has lost its motion.
@@ -159,37 +156,30 @@ impl Columns {
             Complex64::ZERO => Complex64::ZERO,
             _ => -(places[k].local.sum(force.coefficients) - sums[k]) / force.lag,
         });
-        // Known, spline, gain, lag: as forces in the frame.
+        // Known, spline, lag: as forces in the frame.
         let row = |k: usize| -> Vec<Complex64> {
             let turn = places[k].turn * places[k].speed.powi(record.power);
             let known = std::iter::once(beyond[k].unwrap_or_default());
             let spline = forces.iter().map(|force| force[k]);
-            known
-                .chain(spline)
-                .chain([Complex64::ZERO, lags[k]])
-                .map(|force| force * turn)
-                .collect()
+            known.chain(spline).chain([lags[k]]).map(|force| force * turn).collect()
         };
         let rows: Vec<Vec<Complex64>> = (0..places.len()).map(row).collect();
         let total = |k: usize| rows[k][0] + places[k].turn * places[k].speed.powi(record.power) * sums[k];
         let far = |k: usize| record.linear.far(record.periods.omega[k]);
         let count = record.periods.time.len();
         let mut columns = Self {
-            increments: vec![vec![Complex64::ZERO; size + 5]],
+            increments: vec![vec![Complex64::ZERO; size + 4]],
             direct: Vec::new(),
             feedback: vec![Matrix2::zeros()],
             path: (0..count)
                 .map(|k| response[k] - record.periods.linear[k] - far(k) * total(k * PARTS))
                 .collect(),
-            gain: size + 1,
             beyond: Vec::new(),
             lost: Vec::new(),
         };
-        columns.increments[0][size + 3] = Complex64::ONE;
+        columns.increments[0][size + 2] = Complex64::ONE;
         for k in 0..count {
             let mut direct: Vec<Complex64> = rows[k * PARTS].iter().map(|force| force * far(k)).collect();
-            // A base that moves more than it reads moves the linear response as much more.
-            direct[columns.gain] = record.periods.linear[k];
             direct.extend([Complex64::ZERO, record.periods.held[k]]);
             columns.direct.push(direct);
         }
@@ -205,16 +195,6 @@ impl Columns {
         // Nothing says how the last one ends.
         columns.lost.push(true);
         columns
-    }
-
-    /// Increment and direct part of a unit of unknown `n`, counted from 1, at a period.
-    pub fn of_unknown(&self, k: usize, n: usize, unit: Complex64) -> [Vector2<f64>; 2] {
-        let [mut increment, direct] = [&self.increments, &self.direct].map(|of| pair(unit * of[k][n]));
-        if n == self.gain {
-            // With another linear response, u on the path is another.
-            increment += self.feedback[k] * pair(unit * self.direct[k.saturating_sub(1)][n]);
-        }
-        [increment, direct]
     }
 
     /// Forgets the feedback of periods that do not count: nothing is known of their force, and at rest its phase has no meaning.

@@ -25,8 +25,7 @@ pub struct Curve {
     pub coefficients: Vec<Complex64>,
     /// Covariance of their real and imaginary parts.
     pub covariance: DMatrix<f64>,
-    /// Rows, of variance 1, of what the record says of the coefficients without any prior, for a share by which the base moves more than its reference
-    /// reads. The curve is that of a reference that reads what moves.
+    /// Rows, of variance 1, of what the record says of the coefficients without any prior.
     pub information: DMatrix<f64>,
     /// The measured values of these rows.
     pub expected: DVector<f64>,
@@ -113,7 +112,6 @@ impl Curve {
         // The amplitude at which each function counts most.
         let amplitudes: Vec<f64> = self.basis.spread(self.basis.size).map(f64::exp).collect();
         let at = self.at(&amplitudes);
-        let size = self.covariance.nrows();
         let variance = |n: usize| {
             let (amplitude, drive) = (amplitudes[n / 2], at.drive[n / 2]);
             let of = match n % 2 {
@@ -123,20 +121,19 @@ impl Curve {
             };
             (share * of).powi(2)
         };
-        let floor = DMatrix::from_diagonal(&DVector::from_fn(size, |n, _| variance(n)));
+        let floor = DMatrix::from_diagonal(&DVector::from_fn(self.covariance.nrows(), |n, _| variance(n)));
         self.covariance += &floor;
-        let of_the_force = self.information.columns(0, size);
         let rows = self.information.nrows();
-        let of_rows = DMatrix::identity(rows, rows) + of_the_force * floor * of_the_force.transpose();
+        let of_rows = DMatrix::identity(rows, rows) + &self.information * floor * self.information.transpose();
         let whitened = of_rows.cholesky()?.l();
         self.information = whitened.solve_lower_triangular(&self.information)?;
         self.expected = whitened.solve_lower_triangular(&self.expected)?;
         Some(self)
     }
 
-    /// What the record contradicts in a backbone, as a reference reads it that reads a share `gain` too much: residuals of variance 1. Beyond its ends
-    /// the backbone's force continues as it ends. `None` for fewer than four points, and for points that do not rise.
-    pub fn residuals(&self, backbone: &[[f64; 3]], gain: f64) -> Option<DVector<f64>> {
+    /// What the record contradicts in a backbone: residuals of variance 1. Beyond its ends the backbone's force continues as it ends. `None` for
+    /// fewer than four points, and for points that do not rise.
+    pub fn residuals(&self, backbone: &[[f64; 3]]) -> Option<DVector<f64>> {
         let logarithms: Vec<f64> = backbone.iter().map(|point| point[0].ln()).collect();
         let (first, last) = (*logarithms.first()?, *logarithms.last()?);
         // No number rises.
@@ -147,15 +144,13 @@ impl Curve {
             logarithms,
             backbone
                 .iter()
-                .map(|[amplitude, drive, omega]| [*amplitude, drive / (1.0 + gain), *omega])
-                .map(|point| self.linear.force_at_resonance(point, self.power))
+                .map(|point| self.linear.force_at_resonance(*point, self.power))
                 .collect(),
         );
         let at = |a: f64| (a, spline.at(a.clamp(first, last))[0]);
         let force: Vec<(f64, Complex64)> = self.basis.spread(POINTS * self.basis.size).map(at).collect();
         let coefficients = Self::coefficients(&self.basis, &force)?;
-        let moves = (1.0 + gain).recip() - 1.0;
-        let parts: Vec<f64> = coefficients.iter().flat_map(|c| [c.re, c.im]).chain([moves]).collect();
+        let parts: Vec<f64> = coefficients.iter().flat_map(|c| [c.re, c.im]).collect();
         Some(&self.information * DVector::from_vec(parts) - &self.expected)
     }
 }

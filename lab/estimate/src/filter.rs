@@ -138,8 +138,8 @@ impl Filter {
                 let (unknown, is_imaginary) = (n.div_ceil(2), n > 0 && n % 2 == 0);
                 let [increment, direct] = match (n, is_imaginary) {
                     (0, _) => of_record,
-                    (_, false) => columns.of_unknown(k, unknown, Complex64::ONE),
-                    (_, true) => columns.of_unknown(k, unknown, Complex64::i()),
+                    (_, false) => [&columns.increments, &columns.direct].map(|of| pair(of[k][unknown])),
+                    (_, true) => [&columns.increments, &columns.direct].map(|of| pair(Complex64::i() * of[k][unknown])),
                 };
                 let [_, innovation] = period.advance(x, increment, direct);
                 if self.used[k] {
@@ -161,9 +161,8 @@ impl Filter {
         let mut state = Vector2::zeros();
         let mut states = Vec::new();
         for (k, step) in self.periods.iter().enumerate() {
-            let before = k.saturating_sub(1);
-            let path = columns.path[before] - columns.direct[before][columns.gain] * unknowns[columns.gain - 1];
-            let known = pair(sum(&columns.increments[k])) - columns.feedback[k] * pair(path);
+            let known =
+                pair(sum(&columns.increments[k])) - columns.feedback[k] * pair(columns.path[k.saturating_sub(1)]);
             let [predicted, _] = step.advance(&mut state, known, pair(direct[k] - record.departure[k]));
             states.push([predicted, state]);
         }

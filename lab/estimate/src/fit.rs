@@ -17,7 +17,7 @@ const FUNCTIONS: usize = 23;
 const U_LAG: f64 = 0.02;
 /// Share of a sample through which a base holds its amplitude, and its standard uncertainty: all of it in a simulation, none on a smooth base.
 const HELD: (f64, f64) = (0.5, 0.5);
-/// Information on u at the start: none, but for rounding. Its inverse is that on what is exact.
+/// Information on u at the start: none, but for rounding.
 const START_INFORMATION: f64 = 1e-30;
 /// Uncertainty of the curvature of an element's own force, relative: what the uncertainties of a drawing move it by.
 const SHAPE: f64 = 0.25;
@@ -50,8 +50,7 @@ pub struct Estimate<'a> {
     columns: Columns,
 }
 
-/// The unknowns, real and imaginary part of each: spline, share by which the base moves more than its reference reads, lag, u at the start, and the
-/// share of a sample through which the base holds its amplitude.
+/// The unknowns: spline, lag, u at the start, and the share of a sample through which the base holds its amplitude, real and imaginary part of each.
 pub struct Solution {
     /// Twice the negative logarithm of the likelihood, without constants.
     pub deviance: f64,
@@ -125,10 +124,11 @@ impl<'a> Estimate<'a> {
         self.own.fill(Complex64::ZERO);
         self.columns.feedback.iter_mut().for_each(|one| one.fill(0.0));
         for direct in &mut self.columns.direct {
-            // The gain of the reference, and what a held base changes.
-            for n in [self.columns.gain, self.columns.gain + 3] {
-                direct[n] = Complex64::ZERO;
-            }
+            direct
+                .iter_mut()
+                .last()
+                .into_iter()
+                .for_each(|held| *held = Complex64::ZERO);
         }
         self
     }
@@ -146,22 +146,15 @@ impl<'a> Estimate<'a> {
         let n = products.nrows() - 1;
         let information = products.view((1, 1), (n, n)).into_owned();
         let right = products.view((1, 0), (n, 1)).into_owned();
-        let of_spline = 2 * self.basis.size;
+        let m = self.basis.size;
         let (mut normal, mut known) = (information.clone(), right.column(0).into_owned());
         for (part, change) in [1.0 - self.lag.re, -self.lag.im].into_iter().enumerate() {
-            let priors = [
-                // A reference that reads what moves; another gain is for a hypothesis.
-                (0.0, START_INFORMATION.recip()),
-                (change, U_LAG.powi(-2)),
-                (0.0, START_INFORMATION),
-                // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
-                (if part == 0 { HELD.0 } else { 0.0 }, HELD.1.powi(-2)),
-            ];
-            for (n, (expected, information)) in priors.into_iter().enumerate() {
-                let place = of_spline + 2 * n + part;
-                normal[(place, place)] += information;
-                known[place] += expected * information;
-            }
+            normal[(2 * m + part, 2 * m + part)] += U_LAG.powi(-2);
+            known[2 * m + part] += change * U_LAG.powi(-2);
+            normal[(2 * m + 2 + part, 2 * m + 2 + part)] += START_INFORMATION;
+            // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
+            normal[(2 * m + 4 + part, 2 * m + 4 + part)] += HELD.1.powi(-2);
+            known[2 * m + 4 + part] += if part == 0 { HELD.0 } else { 0.0 } * HELD.1.powi(-2);
         }
         let right = known.clone();
         let constant = self.expect(&mut normal, &mut known, hyper[1]);
@@ -171,7 +164,7 @@ impl<'a> Estimate<'a> {
             + normal.ln_determinant()
             + (HELD.0 / HELD.1).powi(2)
             + 4.0 * HELD.1.ln()
-            + 4.0 * (self.basis.size - 2) as f64 * hyper[1].ln();
+            + 4.0 * (m - 2) as f64 * hyper[1].ln();
         let innovations = white.row(0).transpose() - white.rows(1, n).tr_mul(&unknowns);
         let innovations = innovations.as_slice().to_vec();
         deviance.is_finite().then_some(Solution {
@@ -232,7 +225,7 @@ impl<'a> Estimate<'a> {
             }
             let path = self.smooth(self.hyper, &solution);
             // At most a fifth at a time: the force is linear in the factor for small changes only.
-            self.lag = lag + unknowns[m + 1] / (unknowns[m + 1].norm() / 0.2).max(1.0);
+            self.lag = lag + unknowns[m] / (unknowns[m].norm() / 0.2).max(1.0);
             let force = Force {
                 element: self.element,
                 basis: self.basis,
@@ -269,28 +262,23 @@ impl<'a> Estimate<'a> {
 }
 
 impl Solution {
-    /// Rows of variance 1, and their values: what the record says of the first `n` unknowns, those of the spline, for a value of the next one, the gain
-    /// of the reference. They contain no prior of these, and the other unknowns are eliminated. What the record says of the gain alone does not count.
+    /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, and their values: the equations, without the
+    /// other unknowns.
     fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let (all, right) = &self.information;
-        let (first, rest) = (n + 1, all.nrows() - n - 1);
+        let rest = all.nrows() - n;
         // The others keep their prior, which the equations with it contain.
         let lower = self.normal.l();
-        let with_prior = (&lower * lower.transpose())
-            .view((first, first), (rest, rest))
-            .into_owned();
+        let with_prior = (&lower * lower.transpose()).view((n, n), (rest, rest)).into_owned();
         let inverse = with_prior.cholesky()?;
-        let cross = all.view((first, 0), (rest, first)).into_owned();
-        let matrix = all.view((0, 0), (first, first)) - cross.tr_mul(&inverse.solve(&cross));
-        let known = right.rows(0, first) - cross.tr_mul(&inverse.solve(&right.rows(first, rest).into_owned()));
-        let eigen = SymmetricEigen::try_new(matrix.view((0, 0), (n, n)).into_owned(), f64::EPSILON, 30 * n)?;
+        let cross = all.view((n, 0), (rest, n)).into_owned();
+        let matrix = all.view((0, 0), (n, n)) - cross.tr_mul(&inverse.solve(&cross));
+        let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&right.rows(n, rest).into_owned()));
+        let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, 30 * n)?;
         let largest = eigen.eigenvalues.max();
         let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > ROUNDING * largest).collect();
-        let row = |i: &usize| {
-            let (vector, root) = (eigen.eigenvectors.column(*i), eigen.eigenvalues[*i].sqrt());
-            (vector.transpose() * matrix.view((0, 0), (n, first))) / root
-        };
-        let value = |i: &usize| eigen.eigenvectors.column(*i).dot(&known.rows(0, n)) / eigen.eigenvalues[*i].sqrt();
+        let row = |i: &usize| eigen.eigenvectors.column(*i).transpose() * eigen.eigenvalues[*i].sqrt();
+        let value = |i: &usize| eigen.eigenvectors.column(*i).dot(&known) / eigen.eigenvalues[*i].sqrt();
         let rows: Vec<_> = kept.iter().map(row).collect();
         Some((
             DMatrix::from_rows(&rows),

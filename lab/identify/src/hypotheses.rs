@@ -680,14 +680,13 @@ impl Problem<'_> {
     }
 
     /// Residuals of points, perpendicular to the curve, and of records.
-    fn of_data(&self, x: &Unknowns, at: &AtData) -> Option<Vec<f64>> {
-        let gain = self.hypothesis.gain(x);
+    fn of_data(&self, at: &AtData) -> Option<Vec<f64>> {
         let mut residuals: Vec<f64> = Vec::new();
         for [apart, along] in &at.apart {
             residuals.extend(across(along, apart).iter());
         }
         for MeasuredCurve { curve, .. } in &self.data.curves {
-            residuals.extend(curve.residuals(&at.backbone, gain)?.iter());
+            residuals.extend(curve.residuals(&at.backbone)?.iter());
         }
         residuals.iter().all(|one| one.is_finite()).then_some(residuals)
     }
@@ -793,7 +792,7 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
             true => self.motions(x)?.near(near)?,
             false => Vec::new(),
         };
-        let mut residuals = self.of_data(x, &self.at(x, &places)?)?;
+        let mut residuals = self.of_data(&self.at(x, &places)?)?;
         residuals.extend(self.of_known(x));
         Some((residuals, places))
     }
@@ -809,9 +808,9 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
             for ([_, there], [_, along]) in at.apart.iter_mut().zip(&here.apart) {
                 *there = *along;
             }
-            self.of_data(x, &at)
+            self.of_data(&at)
         };
-        let before = self.of_data(x, &here)?;
+        let before = self.of_data(&here)?;
         let [low, high] = [0, 1].map(|end| self.limits().map(|limits| limits[end]));
         let mut rows = vec![Unknowns::zeros(); before.len()];
         for i in (0..UNKNOWNS).filter(|i| self.is_free(*i) && *i != 5) {

@@ -125,13 +125,9 @@ impl Hypothesis {
                 let ratio = amplitude / x[3].exp();
                 [amplitude, omega * (1.0 + 0.375 * x[7] * ratio * ratio), drive]
             }
-            _ => [amplitude, omega, drive * (1.0 + self.gain(x))],
+            Self::Reference => [amplitude, omega, drive * (1.0 + x[7])],
+            _ => [amplitude, omega, drive],
         }
-    }
-
-    /// Share that the reference reads too much.
-    pub(crate) fn gain(self, x: &Unknowns) -> f64 {
-        if self == Self::Reference { x[7] } else { 0.0 }
     }
 
     /// Its curve in closed form, without friction.

@@ -109,10 +109,7 @@ fn fit(curve: &Curve, sensor: Sensor, start: &IdealRig, prior: &IdealRig) -> Opt
     let mut u = IdealRig::UNCERTAINTY;
     u[2] /= prior.r * (1.0 - prior.r);
     let residuals = |x: &SVector<f64, 5>| {
-        let mut residuals = curve
-            .residuals(&IdealRig::of(x).backbone(sensor)?, 0.0)?
-            .as_slice()
-            .to_vec();
+        let mut residuals = curve.residuals(&IdealRig::of(x).backbone(sensor)?)?.as_slice().to_vec();
         residuals.extend((0..5).map(|i| (x[i] - expected[i]) / u[i]));
         residuals.iter().all(|one| one.is_finite()).then_some(residuals)
     };
