@@ -1,7 +1,7 @@
 """Recordings as other programs write them, each made by a few lines, and what happens to them.
 
-Without arguments this writes validation/recordings.csv. With COUNT and SEED it reads COUNT damaged copies of the samples
-instead: every one must be read, or refused by a `ValueError` that names the file.
+Without arguments this writes validation/recordings.csv. With COUNT and SEED it reads COUNT damaged copies of the
+samples instead: every one must be read, or refused by a `ValueError` that names the file.
 """
 
 import csv
