@@ -5,17 +5,16 @@
 mod script;
 
 use std::f64::consts::TAU;
-use std::fmt::{self, Display, Formatter};
 
 use phase_lock::Config;
 use thiserror::Error;
 use vines_model::numerics::mean;
 
-use crate::identification::{Cycle, Departure, Unsteady};
+use crate::identification::{Cycle, Unsteady, departure};
 use crate::record::{Record, Sample};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError, Scaled, Sensors};
 use vines_rig::unit::{Quantity, short};
-use vines_scene::knowledge::Target;
+use vines_scene::knowledge::{Knowledge, Target};
 use vines_scene::plan::{DECAYED, Plan};
 use vines_scene::scene::{Unit, key};
 
@@ -104,85 +103,6 @@ fn unmet_in_words(unmet: Option<&str>) -> String {
     })
 }
 
-/// What a search for the requested drive has found. Responses are displacements at the sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SearchFound {
-    /// Least and largest response that was tried.
-    pub tried: [Quantity; 2],
-    /// Response and drive of the symmetric motion whose drive was nearest to the requested one; `None` without one.
-    pub nearest: Option<[Quantity; 2]>,
-    /// Requested drive.
-    pub requested: Quantity,
-    /// Whether the time ended first.
-    pub late: bool,
-}
-
-impl Display for SearchFound {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let [low, high] = self.tried;
-        write!(f, "of responses from {low} to {high} ")?;
-        match self.nearest {
-            None => f.write_str("none was symmetric and nonlinear")?,
-            Some([response, drive]) => {
-                let share = short(drive.value / self.requested.value);
-                write!(
-                    f,
-                    "that of {response} had the nearest drive, {drive}, {share} times the requested one"
-                )?;
-            }
-        }
-        f.write_str(match (self.late, self.nearest) {
-            (true, _) => "; the time was over (phase_lock.acquire_timeout)",
-            (_, None) => {
-                ". A particle at rest needs a velocity (start.dq2) or a larger drive (phase_lock.amplitude_max, chain.base_range)"
-            }
-            (_, Some(_)) => "; beyond it the motion was lost. `vines backbone` tracks the drives that hold one",
-        })
-    }
-}
-
-/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Evidence {
-    /// Last reading of the response.
-    pub response: Quantity,
-    /// Last reading of the base or the force, if a sensor reads it.
-    pub reference: Option<Quantity>,
-    /// Largest response of the period.
-    pub largest: Quantity,
-    /// After the loss of a lock, the mean phase error of the period, degrees; `None` inside: it is not known.
-    pub phase_error: Option<Option<f64>>,
-    /// Setting of the controller, and its value with its unit.
-    pub limit: Option<(&'static str, String)>,
-    /// Which channel behind a shaker contradicts its past.
-    pub contradicts: Option<&'static str>,
-}
-
-impl Display for Evidence {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        if let Some(error) = self.phase_error {
-            write!(f, "over the last period {}; ", phase_in_words(error))?;
-        }
-        let name = match self.reference {
-            Some(Quantity { unit: "N", .. }) => "force",
-            _ => "base",
-        };
-        if let Some(channel) = self.contradicts {
-            let channel = if channel == "reference" { name } else { channel };
-            write!(f, "the {channel} contradicts its past; ")?;
-        }
-        write!(f, "the response read {}", self.response)?;
-        if let Some(reference) = self.reference {
-            write!(f, ", and the {name} {reference}")?;
-        }
-        write!(f, "; in the last period at most {}", self.largest)?;
-        if let Some((name, value)) = &self.limit {
-            write!(f, "; {} is {value}", key(name))?;
-        }
-        Ok(())
-    }
-}
-
 /// Why an experiment ended early.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
@@ -203,8 +123,13 @@ pub enum ExperimentError {
         /// What kept the bench from taking the motion as settled, if the controller does not judge its lock itself.
         unmet: Option<String>,
     },
-    #[error("no lock within {periods:.0} periods at the requested drive of {}: {found}", found.requested)]
-    NotReached { periods: f64, found: Box<SearchFound> },
+    #[error("no lock within {periods:.0} periods at the requested drive of {requested}: {found}")]
+    NotReached {
+        periods: f64,
+        requested: Quantity,
+        /// What the search has found.
+        found: String,
+    },
     #[error("no lock: the motion, held at a response of {response:.4e} for {periods} periods, is not steady: {why}")]
     NotSteady {
         periods: usize,
@@ -216,10 +141,10 @@ pub enum ExperimentError {
         periods: f64,
         stage: Stage,
         fault: Fault,
-        evidence: Box<Evidence>,
+        evidence: String,
     },
     #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
-    OtherThanAsked { departure: Departure, error: Box<Self> },
+    OtherThanAsked { departure: String, error: Box<Self> },
     #[error(
         "the controller does not release the drive: {periods:.1} periods after `active` became false, it commands {}. A ramp may take {allowed:.1} \
          periods, in which a free response falls to {} %; the drive is off",
@@ -566,11 +491,9 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if fault == Fault::TimedOut {
             return self.no_lock(command);
         }
-        let mut evidence = evidence(self.samples, self.config, &self.plan.knowledge.target, fault);
-        if let Some(path) = self.plan.knowledge.shaker {
-            evidence.contradicts = contradicts(self.samples, self.sample_time, path.drop_out());
-        }
-        let evidence = evidence.into();
+        let Knowledge { target, shaker, .. } = &self.plan.knowledge;
+        let contradicts = shaker.and_then(|path| contradicts(self.samples, self.sample_time, path.drop_out()));
+        let evidence = evidence(self.samples, self.config, target, fault, contradicts);
         ExperimentError::Tripped { periods: self.periods, stage, fault, evidence }
     }
 
@@ -582,7 +505,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             ExperimentError::NoLock { .. } | ExperimentError::ResponseTooLarge { .. } | ExperimentError::Tripped { .. }
         );
         let last = &self.samples[self.samples.len().saturating_sub(self.plan.hold)..];
-        let departure = Departure::of(last, self.plan).filter(|_| is_of_motion && !self.holds_response);
+        let departure = departure(last, self.plan).filter(|_| is_of_motion && !self.holds_response);
         match departure {
             Some(departure) => ExperimentError::OtherThanAsked { departure, error: error.into() },
             None => error,
@@ -675,8 +598,15 @@ fn checked(command: Command, reference: Unit) -> Result<Command, ExperimentError
     Ok(command)
 }
 
-/// What was read before a fault.
-fn evidence(samples: &[Sample], config: &Config, target: &Target, fault: Fault) -> Evidence {
+/// What the sensors read in the last period before a fault, and the limit of the scene that was exceeded, in words. `contradicts`: which channel behind a
+/// shaker contradicts its past.
+fn evidence(
+    samples: &[Sample],
+    config: &Config,
+    target: &Target,
+    fault: Fault,
+    contradicts: Option<&'static str>,
+) -> String {
     let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
     let driven = samples.len() as f64 * config.sample_time;
     let samples = &samples[samples.len().saturating_sub(period)..];
@@ -685,34 +615,43 @@ fn evidence(samples: &[Sample], config: &Config, target: &Target, fault: Fault) 
         .map(|sample| sample.sensors.response.abs())
         .fold(0.0, f64::max);
     let last = samples.last().map(|sample| sample.sensors).unwrap_or_default();
-    let phase_error = (fault == Fault::LockLost).then(|| {
+    let mut text = String::new();
+    if fault == Fault::LockLost {
         let errors: Option<Vec<f64>> = samples.iter().map(|sample| sample.command.phase_error).collect();
-        errors.map(|errors| mean(errors).to_degrees())
-    });
+        let error = errors.map(|errors| mean(errors).to_degrees());
+        text += &format!("over the last period {}; ", phase_in_words(error));
+    }
+    let reference = last.reference.map(|value| target.quantity(1, value));
+    let name = match reference {
+        Some(Quantity { unit: "N", .. }) => "force",
+        _ => "base",
+    };
+    if let Some(channel) = contradicts {
+        let channel = if channel == "reference" { name } else { channel };
+        text += &format!("the {channel} contradicts its past; ");
+    }
+    text += &format!("the response read {}", target.quantity(0, last.response));
+    if let Some(reference) = reference {
+        text += &format!(", and the {name} {reference}");
+    }
+    text += &format!("; in the last period at most {}", target.quantity(0, largest));
     let stated = |limit: Option<f64>, unit| limit.map(|value| Quantity { value, unit }.to_string());
-    let limit = match fault {
+    let (name, limit) = match fault {
         Fault::ResponseTooLarge => {
             let limit = config.response_max.map(|limit| limit_in_words(limit, target));
-            Some(("response_max", limit))
+            ("response_max", limit)
         }
-        Fault::LockLost => Some((
+        Fault::LockLost => (
             "lock.unlock_tolerance",
             stated(Some(config.lock.unlock_tolerance), "rad"),
-        )),
+        ),
         // The first periods contradict their drive.
-        Fault::NoSignal if config.signal_timeout.is_some_and(|limit| driven < limit) => None,
-        Fault::NoSignal => Some(("signal_timeout", stated(config.signal_timeout, "s"))),
-        Fault::Implausible => Some(("residual_max", stated(config.residual_max, "of the amplitude"))),
-        Fault::Sensor | Fault::TimedOut => None,
+        Fault::NoSignal if config.signal_timeout.is_some_and(|limit| driven < limit) => return text,
+        Fault::NoSignal => ("signal_timeout", stated(config.signal_timeout, "s")),
+        Fault::Implausible => ("residual_max", stated(config.residual_max, "of the amplitude")),
+        Fault::Sensor | Fault::TimedOut => return text,
     };
-    Evidence {
-        response: target.quantity(0, last.response),
-        reference: last.reference.map(|value| target.quantity(1, value)),
-        largest: target.quantity(0, largest),
-        phase_error,
-        limit: limit.map(|(name, value)| (name, value.unwrap_or_else(|| "none".into()))),
-        contradicts: None,
-    }
+    text + &format!("; {} is {}", key(name), limit.unwrap_or_else(|| "none".into()))
 }
 
 /// Which channel behind a shaker contradicts its past: the one that differs more from what it read a period before, the response over its amplitude,
@@ -762,7 +701,7 @@ mod tests {
             (Fault::LockLost, "the phase error is 14.324 degrees"),
         ] {
             let target = scene.knowledge().target;
-            let text = evidence(&samples, &scene.controller_config(), &target, fault).to_string();
+            let text = evidence(&samples, &scene.controller_config(), &target, fault, None);
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
         // Under a force, 0.01 m of the driven mode's base are newtons, and its response is read at the sensor.
@@ -774,7 +713,7 @@ mod tests {
             target.units.response.of_metres(0.2),
         ]
         .map(short);
-        let text = evidence(&samples, &force.controller_config(), &target, Fault::Sensor).to_string();
+        let text = evidence(&samples, &force.controller_config(), &target, Fault::Sensor, None);
         assert!(
             text.contains(&format!("the response read {metres} m, and the force {newtons} N")),
             "{text}"

@@ -19,7 +19,7 @@ use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
 use vines_scene::scene::{Measurand, Units};
 
-pub(crate) use asked::{Departure, SAME, is_another};
+pub(crate) use asked::{SAME, departure, is_another};
 pub(crate) use cycle::Cycle;
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
 pub(crate) use decay::{PER_PERIOD, base_at_rest, harmonic};
@@ -37,29 +37,17 @@ pub use vines_model::regime::{Impact, Regime};
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum IdentificationError {
     #[error("the loop is locked, but not as asked: {departure}. There the regime is {regime}")]
-    OtherThanAsked { departure: Departure, regime: Regime },
-    #[error("{}", regime_in_words(*regime, [*sigma, *c], *silent))]
+    OtherThanAsked { departure: String, regime: Regime },
+    #[error("{}", regime_in_words(*regime, *repeats, [*sigma, *c], *silent))]
     Regime {
         regime: Regime,
+        /// Periods of the drive after which a motion of an expected regime repeats, if these are several.
+        repeats: Option<usize>,
         sigma: f64,
         c: f64,
         /// Frequency, Hz, and response of a rig that does not report impacts: nothing is then said of a particle.
         silent: Option<(f64, Quantity)>,
     },
-    #[error(
-        "the loop is locked at {f_hz:.5} Hz with a response of {response:.4e}, but the motion repeats only after {periods} periods of the drive. Try \
-         another drive or another [start]"
-    )]
-    Repeats {
-        periods: usize,
-        f_hz: f64,
-        response: Quantity,
-    },
-    #[error(
-        "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the motion repeats only after {periods} periods of the drive: it is not 1:1. Try \
-         another [start] (the particle must be moving) or another G"
-    )]
-    Subharmonic { periods: usize, sigma: f64, c: f64 },
     #[error(
         "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
     )]
@@ -79,19 +67,28 @@ pub enum IdentificationError {
     SensorAfterRelease { seconds: f64, what: &'static str },
 }
 
-/// That a lock is of another regime than the symmetric 1:1 one.
-fn regime_in_words(regime: Regime, [sigma, c]: [f64; 2], silent: Option<(f64, Quantity)>) -> String {
-    match silent {
-        Some((f_hz, response)) => format!(
-            "the loop is locked at {f_hz:.5} Hz with a response of {response:.4e}, but the motion is {}, and not steady and nonlinear. Try another drive \
-             or another [start]",
-            regime.motion()
-        ),
-        None => format!(
-            "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two impacts per period. Try \
-             another [start] (the particle must be moving) or another G"
-        ),
+/// That a lock is of another regime than the symmetric 1:1 one, or repeats only after several periods.
+fn regime_in_words(
+    regime: Regime,
+    repeats: Option<usize>,
+    [sigma, c]: [f64; 2],
+    silent: Option<(f64, Quantity)>,
+) -> String {
+    let repeats = repeats.map(|periods| format!("the motion repeats only after {periods} periods of the drive"));
+    if let Some((f_hz, response)) = silent {
+        let motion = || format!("the motion is {}, and not steady and nonlinear", regime.motion());
+        let motion = repeats.unwrap_or_else(motion);
+        return format!(
+            "the loop is locked at {f_hz:.5} Hz with a response of {response:.4e}, but {motion}. Try another drive or another [start]"
+        );
     }
+    let motion = match repeats {
+        Some(repeats) => format!("{repeats}: it is not 1:1"),
+        None => format!("the regime is {regime}, not symmetric 1:1 with two impacts per period"),
+    };
+    format!(
+        "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but {motion}. Try another [start] (the particle must be moving) or another G"
+    )
 }
 
 /// What a record says.
@@ -117,7 +114,7 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     let ResonancePoint { f_hz, a_m, sigma, c, .. } = lock.at;
     let response = Quantity { value: a_m, unit: knowledge.target.units.response.symbol };
     let silent = lock.regime_by_impacts.is_none().then_some((f_hz, response));
-    let subharmonic = subharmonic(record.hold(), &knowledge, TAU * f_hz);
+    let repeats = subharmonic(record.hold(), &knowledge, TAU * f_hz);
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so. So is one without symmetry where
     // there may be no cavity.
     let is_expected = match lock.regime {
@@ -126,19 +123,14 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
         _ => false,
     };
     // Another phase or drive has another motion, of which the wanted one says nothing.
-    if (!is_expected || subharmonic.is_some())
-        && let Some(departure) = Departure::of(record.hold(), plan)
+    if (!is_expected || repeats.is_some())
+        && let Some(departure) = departure(record.hold(), plan)
     {
         return Err(IdentificationError::OtherThanAsked { departure, regime: lock.regime });
     }
-    if !is_expected {
-        return Err(IdentificationError::Regime { regime: lock.regime, sigma, c, silent });
-    }
-    if let Some(periods) = subharmonic {
-        return Err(match silent {
-            Some(_) => IdentificationError::Repeats { periods, f_hz, response },
-            None => IdentificationError::Subharmonic { periods, sigma, c },
-        });
+    if !is_expected || repeats.is_some() {
+        let repeats = repeats.filter(|_| is_expected);
+        return Err(IdentificationError::Regime { regime: lock.regime, repeats, sigma, c, silent });
     }
     on_target(&lock, plan.lock.lock.phase_tolerance)?;
     sensors_after_release(record, &knowledge)?;

@@ -64,11 +64,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         Ok(identification) => identification,
         Err(error) => {
             let reason = match &error {
-                IdentificationError::Regime { regime, silent: None, .. } => {
-                    advice::reason(&scene, &plan.knowledge.numbers, Some(*regime))
-                }
-                IdentificationError::Subharmonic { .. } => {
-                    advice::reason(&scene, &plan.knowledge.numbers, Some(Regime::Symmetric))
+                IdentificationError::Regime { regime, repeats, silent: None, .. } => {
+                    let regime = repeats.map_or(*regime, |_| Regime::Symmetric);
+                    advice::reason(&scene, &plan.knowledge.numbers, Some(regime))
                 }
                 _ => None,
             };

@@ -16,14 +16,16 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 
-use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, SearchFound, Stage};
+use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, SAME, Unsteady, is_another,
     regime_by_response, regime_of_leg, subharmonic, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
+use vines_rig::unit::short;
 use vines_scene::knowledge::Knowledge;
 use vines_scene::linear::POINT_RESOLUTION;
+use vines_scene::scene::Units;
 use vines_scene::shaker_path::{BANDWIDTH, ShakerPath};
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work.
@@ -586,18 +588,31 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         }
     }
 
-    /// The requested drive was not reached; `late`: because the time is over.
+    /// The requested drive was not reached; `late`: because the time is over. Responses are displacements at the sensor.
     fn not_reached(&self, late: bool) -> ExperimentError {
-        let units = &self.knowledge.target.units;
-        let found = SearchFound {
-            tried: [self.tried.0, self.tried.1].map(|response| units.response.quantity(response)),
-            nearest: self
-                .nearest
-                .map(|[response, drive, _]| [units.response.quantity(response), units.reference.quantity(drive)]),
-            requested: units.reference.quantity(self.requested),
-            late,
+        let Units { response, reference, .. } = self.knowledge.target.units;
+        let [low, high] = [self.tried.0, self.tried.1].map(|metres| response.quantity(metres));
+        let found = match self.nearest {
+            None => "none was symmetric and nonlinear".into(),
+            Some([at, drive, _]) => format!(
+                "that of {} had the nearest drive, {}, {} times the requested one",
+                response.quantity(at),
+                reference.quantity(drive),
+                short(drive / self.requested)
+            ),
         };
-        ExperimentError::NotReached { periods: self.run.periods, found: found.into() }
+        let why = match (late, self.nearest) {
+            (true, _) => "; the time was over (phase_lock.acquire_timeout)",
+            (_, None) => {
+                ". A particle at rest needs a velocity (start.dq2) or a larger drive (phase_lock.amplitude_max, chain.base_range)"
+            }
+            (_, Some(_)) => "; beyond it the motion was lost. `vines backbone` tracks the drives that hold one",
+        };
+        ExperimentError::NotReached {
+            periods: self.run.periods,
+            requested: reference.quantity(self.requested),
+            found: format!("of responses from {low} to {high} {found}{why}"),
+        }
     }
 }
 
