@@ -173,9 +173,7 @@ pub struct Knowledge {
     pub shaker: Option<ShakerPath>,
     /// Distance of the nearest other pole of a structure from the pole of its driven mode after the release, rad/s; infinite without one.
     pub nearest_pole: f64,
-    /// Periods in which what rings beside the driven mode of a structure falls by a factor of e; 0 without it.
-    pub ringing: f64,
-    /// Poles of the other modes of a structure that ring longest in the response, rad/s.
+    /// Poles of the two other modes of a structure that ring longest in the response, rad/s; the longest first.
     pub rings: [Option<Complex64>; 2],
 }
 
@@ -203,7 +201,6 @@ impl Knowledge {
             target,
             shaker: None,
             nearest_pole: f64::INFINITY,
-            ringing: 0.0,
             rings: [None; 2],
         }
     }

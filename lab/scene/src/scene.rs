@@ -209,7 +209,6 @@ impl Scene {
         knowledge.target.through_shaker = knowledge.shaker.is_some();
         knowledge.target.units = self.units();
         knowledge.nearest_pole = self.structure.as_ref().map_or(f64::INFINITY, Structure::nearest_pole);
-        knowledge.ringing = self.structure.as_ref().map_or(0.0, Structure::ringing);
         knowledge.rings = self.structure.as_ref().map_or([None; 2], Structure::rings);
         knowledge.target.held = self.chain.hold;
         knowledge.target.filter = self.chain.filter.map(|cut_off| cut_off * knowledge.linear.omega0);

@@ -452,11 +452,13 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     ///
     /// The move changes what rings by its own share at most, of which less than the precision is left.
     fn followed(&self, level: f64) -> usize {
-        let Knowledge { shaker, ringing, .. } = self.knowledge;
+        let Knowledge { shaker, rings, target, .. } = self.knowledge;
         // Both roots of the control of a shaker are at half of its bandwidth.
         let of_control = |path: ShakerPath| FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * path.speed);
         let of_control = shaker.map_or(0.0, of_control).min(LONGEST_SETTLING as f64).ceil();
         let share = (level / self.here()[0] - 1.0).abs() / self.run.plan.precision;
+        // In these periods the pole that rings longest falls by a factor of e.
+        let ringing = rings[0].map_or(0.0, |pole| target.omega0 / (TAU * -pole.re));
         let rung_down = (ringing * share.ln()).clamp(0.0, LONGEST_SETTLING as f64).ceil();
         FOLLOWED.max(of_control as usize).max(rung_down as usize)
     }

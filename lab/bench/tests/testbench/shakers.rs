@@ -243,7 +243,7 @@ fn what_rings_beside_the_driven_mode_is_that_of_structure_and_shaker_and_edges_t
     let driven = structure.mode();
     let second = &structure.modes[1];
     let alone = driven.omega / (TAU * second.zeta * second.omega);
-    let ringing = scene.knowledge().ringing;
+    let ringing = driven.omega / (TAU * -scene.knowledge().rings[0].unwrap().re);
     assert!((0.7..1.0).contains(&(ringing / alone)), "{ringing} {alone}");
 }
 

@@ -247,13 +247,6 @@ impl Structure {
         poles
     }
 
-    /// Periods in which what rings beside the driven mode falls by a factor of e; 0 for one oscillator.
-    pub fn ringing(&self) -> f64 {
-        let others = self.poles().into_iter().skip(1);
-        let periods = others.map(|pole| self.mode().omega / (TAU * -pole.re));
-        periods.fold(0.0, f64::max)
-    }
-
     /// Poles of the two modes beside the driven one that ring longest, rad/s.
     pub fn rings(&self) -> [Option<Complex64>; 2] {
         let mut others = self.poles();
