@@ -13,7 +13,7 @@ use vines_bench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment,
-    fit::{Known, MeasuredPoint, Measurements, Recording, Selection, find, requires_sensor},
+    fit::{Known, MeasuredPoint, Measurements, Recording, Selection, decay_in_words, find, requires_sensor},
     identification,
     linear::MeasuredLinear,
     rig::{BuiltIn, Simulated, Stoppable},
@@ -253,8 +253,8 @@ pub fn linear_decay(py: Python<'_>, scene: &Scene, recording: RecordingTuple) ->
     let knowledge = scene.scene.knowledge();
     let decay = calculate(py, move || recording.linear_decay(&knowledge))?.map_err(invalid)?;
     Ok(decay.map(|decay| {
-        let MeasuredLinear { f0, u_f0, zeta, u_zeta, .. } = decay.into();
-        ([f0, u_f0, zeta, u_zeta], decay.to_string())
+        let MeasuredLinear { f0, u_f0, zeta, u_zeta, .. } = decay;
+        ([f0, u_f0, zeta, u_zeta], decay_in_words(&decay))
     }))
 }
 

@@ -20,7 +20,7 @@ use vines_scene::scene::{Parameters, Scene, Units};
 use crate::identification::ResonancePoint;
 
 pub use channels::Selection;
-pub use recording::{LinearDecay, Recording, RecordingError, Stretch};
+pub use recording::{Recording, RecordingError, Stretch, decay_in_words};
 
 /// Standard uncertainty of the gain of a reference that was calibrated as usual, relative.
 pub const CALIBRATION: f64 = 0.01;

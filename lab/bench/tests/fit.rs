@@ -784,9 +784,9 @@ fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_
             ..recording()
         };
         let decay = record.linear_decay(&scene.knowledge()).unwrap().unwrap();
-        for (estimate, truth) in [(decay.omega, omega0), (decay.zeta, zeta)] {
+        for (estimate, truth) in decay.estimates().into_iter().zip([omega0 / TAU, zeta]) {
             pulls.push((estimate.value - truth) / estimate.uncertainty);
-            assert!(estimate.uncertainty < 0.01 * truth, "{decay}");
+            assert!(estimate.uncertainty < 0.01 * truth, "{decay:?}");
         }
     }
     // The frequency of a suspension that hardens depends on the amplitude: at a small one it is within the uncertainty.
@@ -804,12 +804,9 @@ fn a_decay_without_impacts_gives_the_natural_frequency_and_the_damping_with_and_
         ..recording()
     };
     let decay = record.linear_decay(&scene.knowledge()).unwrap().unwrap();
-    assert!(
-        (decay.omega.value - omega0).abs() < 2.0 * decay.omega.uncertainty,
-        "{decay}"
-    );
+    assert!((decay.f0 - omega0 / TAU).abs() < 2.0 * decay.u_f0, "{decay:?}");
     // Without noise too, nothing is more certain than a point: 1e-4 of the half-power bandwidth.
-    assert!(decay.omega.uncertainty > 2e-4 * zeta * omega0, "{decay}");
+    assert!(decay.u_f0 > 2e-4 * zeta * omega0 / TAU, "{decay:?}");
     // The mean square of 40 normal values has a standard deviation of 0.22.
     let square = mean_square(pulls.iter().copied());
     assert!((0.5..1.5).contains(&square), "{square}");

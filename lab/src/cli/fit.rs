@@ -8,7 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use vines::fit::{
     CALIBRATION, FitReport, FittedParameter, Found, Hypothesis, HypothesisReport, Known, LinearVerdict, Measurements,
-    Quantity, Selection, Stretch, decimals, find, requires_sensor,
+    Quantity, Selection, Stretch, decay_in_words, decimals, find, requires_sensor,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
@@ -223,8 +223,8 @@ fn gathered(
                 notes.extend(recording.notes.iter().cloned());
                 match recording.linear_decay(&scene.knowledge()).map_err(Failure::run)? {
                     Some(decay) => {
-                        notes.push(format!("{}: {decay}", recording.origin));
-                        measured.linear.push(decay.into());
+                        notes.push(format!("{}: {}", recording.origin, decay_in_words(&decay)));
+                        measured.linear.push(decay);
                     }
                     None => {
                         if !recording.is_own {

@@ -4,7 +4,6 @@
 //! channels are made displacements, and what is no measurement of a rig near resonance is refused.
 
 use std::f64::consts::{SQRT_2, TAU};
-use std::fmt::{self, Display, Formatter};
 
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -46,38 +45,14 @@ pub struct Recording {
     pub notes: Vec<String>,
 }
 
-/// Natural frequency and damping ratio of a structure, from its free decay without impacts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearDecay {
-    /// Natural frequency, rad/s.
-    pub omega: Estimate,
-    /// Damping ratio.
-    pub zeta: Estimate,
-}
-
-impl Display for LinearDecay {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let [f0, zeta] = [self.omega.scaled(1.0 / TAU), self.zeta].map(|Estimate { value, uncertainty }| {
-            let decimals = decimals(uncertainty);
-            format!("{value:.decimals$} ± {uncertainty:.decimals$}")
-        });
-        write!(f, "no impacts: this is a linear decay, f0 = {f0} Hz, zeta = {zeta}")
-    }
-}
-
-impl From<LinearDecay> for MeasuredLinear {
-    /// A decay does not tell the state of the particle.
-    fn from(decay: LinearDecay) -> Self {
-        let f0 = decay.omega.scaled(1.0 / TAU);
-        Self {
-            f0: f0.value,
-            u_f0: f0.uncertainty,
-            zeta: decay.zeta.value,
-            u_zeta: decay.zeta.uncertainty,
-            correlation: 0.0,
-            particle: ParticleState::Unknown,
-        }
-    }
+/// What a linear decay says, in words.
+#[must_use]
+pub fn decay_in_words(decay: &MeasuredLinear) -> String {
+    let [f0, zeta] = decay.estimates().map(|Estimate { value, uncertainty }| {
+        let decimals = decimals(uncertainty);
+        format!("{value:.decimals$} ± {uncertainty:.decimals$}")
+    });
+    format!("no impacts: this is a linear decay, f0 = {f0} Hz, zeta = {zeta}")
 }
 
 /// Why a recording gives no points: the message says what is wrong, and what to do.
@@ -161,11 +136,11 @@ impl Recording {
     }
 
     /// The linear decay, if the base rests all the time and the damping does not depend on the amplitude: one free oscillation, from the period with the
-    /// largest response to the first one that noise hides.
+    /// largest response to the first one that noise hides. It does not tell the state of the particle.
     ///
     /// # Errors
     /// As [`Recording::prepared`], and where the base rests and the response does not decay.
-    pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<LinearDecay>, RecordingError> {
+    pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<MeasuredLinear>, RecordingError> {
         let knowledge = self.knowledge(knowledge);
         let one = self.prepared(&knowledge)?;
         let [response, base] = [0, 1].map(|channel| one.fundamentals(channel, &knowledge));
@@ -218,14 +193,18 @@ impl Recording {
             .iter()
             .map(|(of_piece, u)| (of_piece.im - pole.im).abs() - significant * u);
         let changed = changes.fold(0.0, f64::max);
-        let estimate = |value: f64, u: f64| Estimate {
-            value: value / self.sample_time,
-            uncertainty: u / self.sample_time,
-        };
         // As of a stated point: of the half-power bandwidth.
         let u = u.hypot(POINT_RESOLUTION * 2.0 * -pole.re);
-        let (omega, rate) = (estimate(pole.norm(), u.hypot(changed)), estimate(-pole.re, u));
-        Ok(Some(LinearDecay { omega, zeta: rate.scaled(1.0 / omega.value) }))
+        let [omega, u_omega, rate, u_rate] =
+            [pole.norm(), u.hypot(changed), -pole.re, u].map(|per_sample| per_sample / self.sample_time);
+        Ok(Some(MeasuredLinear {
+            f0: omega / TAU,
+            u_f0: u_omega / TAU,
+            zeta: rate / omega,
+            u_zeta: u_rate / omega,
+            correlation: 0.0,
+            particle: ParticleState::Unknown,
+        }))
     }
 
     fn drive_is_named(&self) -> bool {
