@@ -180,23 +180,31 @@ impl Structure {
         };
         let place = (excitation == Excitation::Force).then_some(0);
         let at = Places { cavity: 0, drive: place, sensor: 0 };
-        let (points, modes) = (vec!["mass".to_owned()], vec![mode]);
-        let checked = check(&points, &modes, 0, &at).and_then(|()| {
-            let (equations, coordinates) = equations(&modes, None, &at, 1);
-            let host = equations
-                .host(excitation.of_host())
-                .map_err(|error| error.to_string())?;
-            let rows = rows(&host, &coordinates)?;
-            Ok((equations, coordinates, host, rows))
-        });
-        let (equations, coordinates, host, rows) = checked.map_err(|message| SceneError::text("[plant]", message))?;
+        let parts = Parts {
+            points: vec!["mass".to_owned()],
+            modes: vec![mode],
+            coupled: None,
+        };
+        Self::of_parts(excitation, parts, at, 0).map_err(|message| SceneError::text("[plant]", message))
+    }
+
+    /// The structure of these modes, or of the matrices where the damping couples them.
+    fn of_parts(excitation: Excitation, parts: Parts, at: Places, driven: usize) -> Result<Self, String> {
+        let Parts { points, modes, coupled } = parts;
+        check(&points, &modes, driven, &at)?;
+        let (equations, coordinates) = equations(&modes, coupled.as_ref(), &at, points.len());
+        let host = equations
+            .host(excitation.of_host())
+            .map_err(|error| error.to_string())?;
+        let rows = rows(&host, &coordinates)?;
+        let Places { cavity, drive, sensor } = at;
         Ok(Self {
             excitation,
             points,
-            cavity: 0,
-            drive: place,
-            sensor: 0,
-            driven: 0,
+            cavity,
+            drive,
+            sensor,
+            driven,
             modes,
             equations,
             host,
@@ -429,48 +437,25 @@ impl StructureSection {
 
     fn checked(self, folder: &Path) -> Result<Structure, String> {
         let parts = self.parts(folder)?;
-        let points = parts.points.clone();
-        let at = self.places(&points)?;
-        let masses = self.mounted(&points)?;
+        let at = self.places(&parts.points)?;
+        let masses = self.mounted(&parts.points)?;
         let omega_without_masses = match masses.is_empty() {
             true => Vec::new(),
             false => parts.modes.iter().map(|mode| mode.omega).collect(),
         };
-        let Parts { mut modes, coupled, .. } = parts.loaded(&masses)?;
+        let mut parts = parts.loaded(&masses)?;
         if let Some(drive) = at.drive {
-            modes.iter_mut().for_each(|mode| mode.drive = mode.shape[drive]);
+            parts.modes.iter_mut().for_each(|mode| mode.drive = mode.shape[drive]);
         }
         let driven = self.mode.unwrap_or(1);
-        if !(1..=modes.len()).contains(&driven) {
+        if !(1..=parts.modes.len()).contains(&driven) {
             return Err(format!(
                 "mode = {driven}: the structure has the modes 1 to {}",
-                modes.len()
+                parts.modes.len()
             ));
         }
-        let driven = driven - 1;
-        check(&points, &modes, driven, &at)?;
-        let (equations, coordinates) = equations(&modes, coupled.as_ref(), &at, points.len());
-        let host = equations
-            .host(self.excitation.of_host())
-            .map_err(|error| error.to_string())?;
-        let rows = rows(&host, &coordinates)?;
-        let Places { cavity, drive, sensor } = at;
-        Ok(Structure {
-            excitation: self.excitation,
-            points,
-            cavity,
-            drive,
-            sensor,
-            driven,
-            modes,
-            equations,
-            host,
-            coordinates,
-            rows,
-            masses,
-            omega_without_masses,
-            shaker: None,
-        })
+        let structure = Structure::of_parts(self.excitation, parts, at, driven - 1)?;
+        Ok(Structure { masses, omega_without_masses, ..structure })
     }
 
     /// Points and modes, by the one description that is given.
@@ -582,10 +567,8 @@ impl StructureSection {
                 ));
             }
             let shape: Vec<f64> = shape.values().copied().collect();
-            let by_mass = match &mass {
-                Some(mass) => Some(self.by_mass(mass, number, &points, &shape)?),
-                None => None,
-            };
+            let by_mass = mass.as_ref().map(|mass| self.by_mass(mass, number, &points, &shape));
+            let by_mass = by_mass.transpose()?;
             let drive = match (self.excitation, participation.or(by_mass)) {
                 (Excitation::Force, None) => 0.0,
                 (Excitation::Base, Some(participation)) => participation,
