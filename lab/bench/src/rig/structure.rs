@@ -146,39 +146,11 @@ impl SimulatedStructure {
         plant.set_time(clock.time());
         plant.advance_within(self.clipped_at, drive, step)?;
         clock.advance(step);
-        let rows = &shaker.rows;
-        let limits = &shaker.limits;
-        for (name, key, row, per_command, limit, unit) in [
-            (
-                "voltage",
-                "voltage_max",
-                &rows.voltage,
-                rows.voltage_per_command,
-                limits.voltage,
-                "V",
-            ),
-            (
-                "current",
-                "current_max",
-                &rows.current,
-                rows.current_per_command,
-                limits.current,
-                "A",
-            ),
-            (
-                "displacement of the armature",
-                "stroke_max",
-                &rows.armature,
-                0.0,
-                limits.stroke,
-                "m",
-            ),
-            ("force", "force_max", &rows.force, 0.0, limits.force, "N"),
-        ] {
-            let value = plant.point(row)[0] + per_command * plant.base_displacement();
+        for (name, key, channel) in shaker.limited() {
+            let value = channel.read(plant);
             // The command is clipped at the limit itself.
-            if let Some(limit) = limit.filter(|limit| value.abs() > limit * (1.0 + 1e-9)) {
-                return Err(RigError::ShakerLimit { name, key, value, limit, unit });
+            if let Some(limit) = channel.limit.filter(|limit| value.abs() > limit * (1.0 + 1e-9)) {
+                return Err(RigError::ShakerLimit { name, key, value, limit, unit: channel.unit });
             }
         }
         Ok(())

@@ -76,6 +76,33 @@ impl SceneShaker {
         limit.map_or(f64::INFINITY, |limit| limit / self.shaker.gain)
     }
 
+    /// What has a limit: its name and the key of the limit in messages, and the channel.
+    pub fn limited(&self) -> [(&'static str, &'static str, Channel<'_>); 4] {
+        let Self { limits, rows, .. } = self;
+        let channel = |name, unit, row, limit| Channel { name, row, per_drive: 0.0, unit, limit, meaning: None };
+        let voltage = Channel {
+            per_drive: rows.voltage_per_command,
+            meaning: Some("voltage of the coil"),
+            ..channel("voltage", "V", &rows.voltage, limits.voltage)
+        };
+        let current = Channel {
+            per_drive: rows.current_per_command,
+            meaning: Some("current of the coil"),
+            ..channel("current", "A", &rows.current, limits.current)
+        };
+        let force = Channel {
+            meaning: Some("force of the stinger on the structure"),
+            ..channel("force", "N", &rows.force, limits.force)
+        };
+        let armature = channel(ARMATURE, "m", &rows.armature, limits.stroke);
+        [
+            ("voltage", "voltage_max", voltage),
+            ("current", "current_max", current),
+            ("force", "force_max", force),
+            ("displacement of the armature", "stroke_max", armature),
+        ]
+    }
+
     /// The reference in the sections of the host: the displacement of the table, or the force of the stinger; and the inertia that is subtracted from
     /// it, per negative acceleration.
     pub(super) fn reference_and_inertia(&self, excitation: Excitation) -> [Row; 2] {
@@ -138,35 +165,17 @@ impl Structure {
         };
         let points = self.points.iter().map(String::as_str).zip(&self.rows);
         let mut channels: Vec<_> = points.map(point).collect();
-        let Some(SceneShaker { shaker, limits, rows, .. }) = &self.shaker else {
+        let Some(shaker) = &self.shaker else {
             return channels;
         };
         if self.excitation == Excitation::Base {
-            channels.push(point((TABLE, &rows.end)));
+            channels.push(point((TABLE, &shaker.rows.end)));
         }
-        channels.push(Channel { limit: limits.stroke, ..point((ARMATURE, &rows.armature)) });
-        channels.push(Channel {
-            unit: "N",
-            limit: limits.force,
-            meaning: Some("force of the stinger on the structure"),
-            ..point(("force", &rows.force))
-        });
-        channels.push(Channel {
-            per_drive: rows.current_per_command,
-            unit: "A",
-            limit: limits.current,
-            meaning: Some("current of the coil"),
-            ..point(("current", &rows.current))
-        });
+        let [voltage, current, force, armature] = shaker.limited().map(|(.., channel)| channel);
+        channels.extend([armature, force, current]);
         // An amplifier that controls the voltage clips it.
-        if limits.voltage.is_some() && shaker.amplifier == Amplifier::Current {
-            channels.push(Channel {
-                per_drive: rows.voltage_per_command,
-                unit: "V",
-                limit: limits.voltage,
-                meaning: Some("voltage of the coil"),
-                ..point(("voltage", &rows.voltage))
-            });
+        if voltage.limit.is_some() && shaker.shaker.amplifier == Amplifier::Current {
+            channels.push(voltage);
         }
         channels
     }
@@ -194,24 +203,15 @@ impl Structure {
             let [by_command, by_force] = of(row);
             by_command * command + by_force * force
         };
-        let (rows, limits) = (&shaker.rows, &shaker.limits);
-        let current = at(&rows.current) + rows.current_per_command * command;
-        let voltage = at(&rows.voltage) + rows.voltage_per_command * command;
-        let needed = [
-            ("voltage_max", "V", voltage, limits.voltage),
-            ("current_max", "A", current, limits.current),
-            ("stroke_max", "m", at(&rows.armature), limits.stroke),
-            ("force_max", "N", at(&rows.force), limits.force),
-        ];
-        let beyond = needed
-            .into_iter()
-            .find_map(|(key, unit, value, limit)| Some((key, unit, value.norm(), limit?)).filter(|one| one.2 > one.3));
-        beyond.map(|(key, unit, value, limit)| {
-            format!(
-                "[excitation] needs {value:.4} {unit} at a response of half of the cavity, {:.2} times what shaker.{key} = {limit} allows: lower the drive, \
+        shaker.limited().into_iter().find_map(|(_, key, channel)| {
+            let value = (at(channel.row) + channel.per_drive * command).norm();
+            let limit = channel.limit.filter(|limit| value > *limit)?;
+            Some(format!(
+                "[excitation] needs {value:.4} {} at a response of half of the cavity, {:.2} times what shaker.{key} = {limit} allows: lower the drive, \
                  raise the limit, or choose a drive point that moves less",
+                channel.unit,
                 value / limit
-            )
+            ))
         })
     }
 
@@ -385,18 +385,6 @@ impl ShakerSection {
             stroke: self.stroke_max,
             force: self.force_max,
         };
-        for (key, limit, unit) in [
-            ("voltage_max", limits.voltage, "V"),
-            ("current_max", limits.current, "A"),
-            ("stroke_max", limits.stroke, "m"),
-            ("force_max", limits.force, "N"),
-        ] {
-            if let Some(value) = limit.filter(|value| !(*value > 0.0 && value.is_finite())) {
-                return Err(format!(
-                    "{key} = {value} {unit}: a limit must be positive and finite; leave it out for none"
-                ));
-            }
-        }
         if self.amplifier == Amplifier::Current
             && limits.voltage.is_some()
             && self.inductance > 0.0
@@ -414,10 +402,18 @@ impl ShakerSection {
             ));
         }
         let structure = structure.with_shaker(shaker, compensated, limits, self.release)?;
-        match &structure.shaker {
-            Some(attached) if attached.reference_per_command > 0.0 => Ok(structure),
-            _ => Err("the command does not move the driven mode: check the drive point, and gain and Bl".into()),
+        let attached = structure.shaker.as_ref();
+        let moving = attached.filter(|attached| attached.reference_per_command > 0.0);
+        let moving =
+            moving.ok_or("the command does not move the driven mode: check the drive point, and gain and Bl")?;
+        for (_, key, Channel { limit, unit, .. }) in moving.limited() {
+            if let Some(value) = limit.filter(|value| !(*value > 0.0 && value.is_finite())) {
+                return Err(format!(
+                    "{key} = {value} {unit}: a limit must be positive and finite; leave it out for none"
+                ));
+            }
         }
+        Ok(structure)
     }
 }
 
