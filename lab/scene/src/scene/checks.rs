@@ -168,7 +168,7 @@ fn as_detected(scene: &Scene) -> Range {
 type Rule = fn(&Scene) -> Option<String>;
 
 /// What joins keys of several sections.
-const RULES: [Rule; 10] = [
+const RULES: [Rule; 8] = [
     mode_without_cavity,
     start_beyond_structure,
     second_reference,
@@ -176,9 +176,7 @@ const RULES: [Rule; 10] = [
     drive_beyond_shaker,
     force_without_sensor,
     quantity_of_v,
-    quantity_of_calculated_force,
-    quantity_of_shaker_force,
-    quantity_without_sensor,
+    quantity_of_reference,
 ];
 
 /// No impact moves a mode whose node is at the cavity.
@@ -249,36 +247,19 @@ fn quantity_of_v(scene: &Scene) -> Option<String> {
     })
 }
 
-/// A force of spring and damper is calculated from the displacement of the base.
-fn quantity_of_calculated_force(scene: &Scene) -> Option<String> {
-    let name = derivative(scene.resonance.reference_quantity)?;
-    (scene.resonance.reference == Reference::Force).then(|| {
-        format!(
-            "resonance.reference_quantity = \"{name}\" with resonance.reference = \"force\": the force k e + c e' follows from the displacement of \
-             the base; take the reference \"base\", or the quantity \"displacement\""
-        )
-    })
-}
-
-/// A force cell reads a force.
-fn quantity_of_shaker_force(scene: &Scene) -> Option<String> {
+/// Only the sensor of a base reads a velocity or an acceleration.
+fn quantity_of_reference(scene: &Scene) -> Option<String> {
     let name = derivative(scene.resonance.reference_quantity)?;
     let is_force = |one: &Structure| one.excitation == Excitation::Force;
-    scene.structure.as_ref().is_some_and(is_force).then(|| {
-        format!(
-            "resonance.reference_quantity = \"{name}\" where a force drives the structure: the reference is this force; drop the key, which belongs to \
-             a base"
-        )
-    })
-}
-
-/// Without a sensor, the reference is the displacement that is commanded.
-fn quantity_without_sensor(scene: &Scene) -> Option<String> {
-    let name = derivative(scene.resonance.reference_quantity)?;
-    (!scene.chain.reference).then(|| {
-        format!(
-            "resonance.reference_quantity = \"{name}\" with chain.reference = false: no sensor reads the base, and the reference is the displacement \
-             that is commanded; drop one of the keys"
-        )
-    })
+    let reason = if scene.resonance.reference == Reference::Force {
+        "with resonance.reference = \"force\": the force k e + c e' follows from the displacement of the base; take the reference \"base\", or the \
+         quantity \"displacement\""
+    } else if scene.structure.as_ref().is_some_and(is_force) {
+        "where a force drives the structure: the reference is this force; drop the key, which belongs to a base"
+    } else if !scene.chain.reference {
+        "with chain.reference = false: no sensor reads the base, and the reference is the displacement that is commanded; drop one of the keys"
+    } else {
+        return None;
+    };
+    Some(format!("resonance.reference_quantity = \"{name}\" {reason}"))
 }
