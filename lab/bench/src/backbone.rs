@@ -5,10 +5,7 @@
 //! the *response*, and the drive follows. The points before predict drive and frequency of the next one,
 //! so that the loops have little to correct.
 
-use std::fmt::{self, Display, Formatter};
-
 use serde::Serialize;
-use vines_rig::unit::Quantity;
 
 use crate::experiment::{ControlLoop, ExperimentError, Level, Script, Stage, is_reached};
 use crate::identification::{
@@ -89,46 +86,10 @@ pub struct Tracked {
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
     pub periods: f64,
-    /// Where the curve ended before the last level; absent if it did not.
-    pub end: Option<CurveEnd>,
+    /// Where the curve ended before the last level, at its fold or where the motion changes otherwise, in words; absent if it did not.
+    pub end: Option<String>,
     /// Why tracking failed before the last level; absent if it did not.
     pub ended: Option<ExperimentError>,
-}
-
-/// Where a backbone ends: at its fold, or where the motion changes otherwise.
-#[derive(Debug)]
-pub struct CurveEnd {
-    /// The last response with the 1:1 motion, and the level without it.
-    pub between: [Quantity; 2],
-    /// Both over the half-width.
-    pub c: [f64; 2],
-    /// The motion at the level.
-    pub regime: Regime,
-    /// The rig does not report impacts: nothing is then said of a particle.
-    pub is_silent: bool,
-    /// What ended tracking below the level: without the motion of the curve, response or drive may be too small for the controller.
-    pub after: Option<ExperimentError>,
-}
-
-impl Display for CurveEnd {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let ([held, level], [c, beyond]) = (self.between, self.c);
-        match self.is_silent {
-            true => write!(
-                f,
-                "The backbone ends between responses of {held:.4e} and {level:.4e}: the motion there is {}",
-                self.regime.motion()
-            ),
-            false => write!(
-                f,
-                "The backbone ends between {held:.4e} (C = {c:.4}) and {level:.4e} (C = {beyond:.4}): the motion there is {}",
-                self.regime
-            ),
-        }?;
-        self.after
-            .as_ref()
-            .map_or(Ok(()), |error| write!(f, ". After that, {error}"))
-    }
 }
 
 /// Largest ratio of successive levels. The points before predict drive and frequency of the next one; where it is farther away, the error of the
@@ -140,8 +101,8 @@ struct Tracker<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     script: Script<'b, 'a, R, C>,
     plan: &'a Plan,
     points: Vec<LevelPoint>,
-    /// Where the motion of the curve ended.
-    end: Option<CurveEnd>,
+    /// Where the motion of the curve ended, in words.
+    end: Option<String>,
 }
 
 /// Tracks the backbone.
@@ -181,8 +142,9 @@ pub fn track_into(
     let (end, ended) = match (followed, end) {
         // What was measured is kept.
         (Err(error), _) if points.is_empty() => return Err(error),
+        // Without the motion of the curve, response or drive may be too small for the controller.
         (Err(error @ ExperimentError::Tripped { .. }), Some(end)) => {
-            (Some(CurveEnd { after: Some(error), ..end }), None)
+            (Some(format!("{end}. After that, {error}")), None)
         }
         (Err(error), _) => (None, Some(error)),
         (Ok(has_ended), end) => (end.filter(|_| has_ended), None),
@@ -218,12 +180,17 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
                 (_, Regime::Symmetric | Regime::Unresolved | Regime::Asymmetric) => self.end = None,
                 (Some((held, Regime::Symmetric | Regime::Unresolved)), regime) => {
                     let Knowledge { target, numbers, .. } = &self.plan.knowledge;
-                    self.end = Some(CurveEnd {
-                        between: [held, level].map(|metres| target.units.response.quantity(metres)),
-                        c: [held, level].map(|metres| metres / numbers.b),
-                        regime,
-                        is_silent,
-                        after: None,
+                    let [from, to] = [held, level].map(|metres| target.units.response.quantity(metres));
+                    let [c, beyond] = [held, level].map(|metres| metres / numbers.b);
+                    // Nothing is said of a particle on a rig that does not report impacts.
+                    self.end = Some(match is_silent {
+                        true => format!(
+                            "The backbone ends between responses of {from:.4e} and {to:.4e}: the motion there is {}",
+                            regime.motion()
+                        ),
+                        false => format!(
+                            "The backbone ends between {from:.4e} (C = {c:.4}) and {to:.4e} (C = {beyond:.4}): the motion there is {regime}"
+                        ),
                     });
                 }
                 _ => {}

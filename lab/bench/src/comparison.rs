@@ -419,7 +419,7 @@ impl TrackedComparison {
         let compare = |point: &LevelPoint| TrackedPoint { point: *point, exact: exact(point) };
         Self {
             points: tracked.points.iter().map(compare).collect(),
-            end: tracked.end.as_ref().map(ToString::to_string),
+            end: tracked.end.clone(),
             periods_to_lock: tracked.periods_to_lock,
             periods: tracked.periods,
             u_linear: knowledge.is_measured.then(|| {

@@ -162,12 +162,9 @@ fn a_curve_that_ends_on_a_rig_without_reported_impacts_is_a_result_though_the_co
         let tracked = track(&mut rig, &mut controller, &plan, |_, _| {}).unwrap();
         assert!(tracked.ended.is_none(), "{r}, {snr} dB: {:?}", tracked.ended);
         let end = tracked.end.unwrap();
-        assert_eq!(end.after.is_some(), stops, "{r}, {snr} dB: {end}");
-        assert_eq!(
-            end.to_string()
-                .contains(". After that, the controller switched the drive off"),
-            stops
-        );
+        let said =
+            [". After that", ". After that, the controller switched the drive off"].map(|words| end.contains(words));
+        assert_eq!(said, [stops; 2], "{r}, {snr} dB: {end}");
     }
 }
 
