@@ -565,7 +565,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
                 Cycle::of(period, self.run.sample_time, turns * TAU, self.knowledge.target)
             })
             .collect();
-        let Some(fit) = ResonanceFit::of(&cycles, self.knowledge) else {
+        let Some(fit) = ResonanceFit::of(&cycles, self.knowledge, None, false) else {
             return self.measure(periods, is_at_rest);
         };
         let [drive, omega] = fit.at_mean();

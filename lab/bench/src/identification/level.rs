@@ -130,7 +130,7 @@ impl Criterion {
 
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
-        let fit = |slopes| ResonanceFit::held(cycles, &self.knowledge, slopes);
+        let fit = |slopes| ResonanceFit::of(cycles, &self.knowledge, slopes, true);
         let mut whole = fit(None)?;
         let [base, omega] = whole.at_mean().map(|value| value.value);
         if let Some(known) = self.slopes([whole.response.value, base, omega]) {

@@ -49,19 +49,10 @@ impl ResonanceFit {
     /// Fewest periods: one more than a steady motion has unknowns.
     pub(crate) const FEWEST: usize = 4;
 
-    /// From at least four periods of a rig of which this is known, as if the force followed at once and nothing rang: the first question to a
-    /// motion, whether it needs impacts.
-    pub fn of(cycles: &[Cycle], knowledge: &Knowledge) -> Option<Self> {
-        Self::with(cycles, knowledge, None, false)
-    }
-
-    /// From at least four periods at a level, where impacts may lag; `slopes`: of `E_R` and `omega_R` over the amplitude, from neighbouring points of the
-    /// backbone.
-    pub fn held(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>) -> Option<Self> {
-        Self::with(cycles, knowledge, slopes, true)
-    }
-
-    fn with(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>, is_held: bool) -> Option<Self> {
+    /// From at least four periods of a rig of which this is known. If `is_held`, at a level, where impacts may lag and other modes ring; otherwise as if the
+    /// force followed at once and nothing rang: the first question to a motion, whether it needs impacts. `slopes`: of `E_R` and `omega_R` over the
+    /// amplitude, from neighbouring points of the backbone.
+    pub fn of(cycles: &[Cycle], knowledge: &Knowledge, slopes: Option<[Estimate; 2]>, is_held: bool) -> Option<Self> {
         if cycles.len() < Self::FEWEST {
             return None;
         }
