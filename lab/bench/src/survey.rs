@@ -49,13 +49,9 @@ impl Survey {
     /// Number of orbits that are tried where the backbone is one curve.
     pub const ORBITS: usize = 2 * CURVE_ORBITS;
 
-    /// The survey of a scene's structure; `None` without one.
-    pub fn of(scene: &Scene) -> Option<Self> {
-        Self::with(scene, &|| ())
-    }
-
-    /// The survey; `progress` is called for every orbit of the backbone that is tried, about [`Self::ORBITS`] times.
-    pub fn with(scene: &Scene, progress: &dyn Fn()) -> Option<Self> {
+    /// The survey of a scene's structure; `None` without one. `progress` is called for every orbit of the backbone that is tried, about
+    /// [`Self::ORBITS`] times.
+    pub fn of(scene: &Scene, progress: &dyn Fn()) -> Option<Self> {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
         let driven = section_of(structure);
         let facts = orbits.facts(driven, scene.frequencies(), CURVE_ORBITS, progress)?;
@@ -120,52 +116,46 @@ fn with_response(orbits: &StructureOrbits, response: f64, omega: f64) -> Option<
 
 /// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
 pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
-    let of_structure = || {
-        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
-        let found = orbits.resonant(scene.structure_drive()?, scene.frequencies());
-        Some(
-            found
-                .iter()
-                .map(|orbit| of_driven_mode(orbit, structure, numbers))
-                .collect(),
-        )
+    let Some((structure, drive)) = scene.structure.as_ref().zip(scene.structure_drive()) else {
+        return orbit::phase_resonant(numbers);
     };
-    of_structure().unwrap_or_else(|| orbit::phase_resonant(numbers))
+    let found = scene.orbits_of(structure).resonant(drive, scene.frequencies());
+    found
+        .iter()
+        .map(|orbit| of_driven_mode(orbit, structure, numbers))
+        .collect()
 }
 
-/// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
-pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
-    let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+/// A scene's structure and its exact backbone; `None` for one oscillator.
+fn backbone_of(scene: &Scene) -> Option<(&Structure, Vec<StructureBranch>)> {
+    let structure = scene.structure.as_ref()?;
+    let orbits = scene.orbits_of(structure);
     // Other modes may have the motion that the loop finds.
     let range = orbits
         .range(section_of(structure), CURVE_ORBITS)?
         .with(scene.frequencies());
+    Some((structure, orbits.backbone(&range)))
+}
+
+/// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
+pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
+    let (structure, branches) = backbone_of(scene)?;
     let told = |orbit: &StructureOrbit| of_driven_mode(orbit, structure, numbers);
-    let curves = orbits.backbone(&range).into_iter();
-    Some(curves.map(|branch| branch.orbits.iter().map(told).collect()).collect())
+    let curve = |branch: &StructureBranch| branch.orbits.iter().map(told).collect();
+    Some(branches.iter().map(curve).collect())
 }
 
 /// The stable orbits of a scene's exact backbone, with those where its stable stretches begin and end.
 pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
-    let of_structure = || {
-        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
-        let range = orbits
-            .range(section_of(structure), CURVE_ORBITS)?
-            .with(scene.frequencies());
-        let branches = orbits.backbone(&range);
-        let stable = branches
-            .iter()
-            .flat_map(StructureBranch::stable_to_their_ends)
-            .flatten();
-        Some(stable.map(|orbit| of_driven_mode(orbit, structure, numbers)).collect())
+    let Some((structure, branches)) = backbone_of(scene) else {
+        let stable = orbit::stable_backbone(numbers, DETUNINGS, CURVE_ORBITS);
+        return stable.into_iter().flatten().collect();
     };
-    let alone = || {
-        orbit::stable_backbone(numbers, DETUNINGS, CURVE_ORBITS)
-            .into_iter()
-            .flatten()
-            .collect()
-    };
-    of_structure().unwrap_or_else(alone)
+    let stable = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
+    stable
+        .flatten()
+        .map(|orbit| of_driven_mode(orbit, structure, numbers))
+        .collect()
 }
 
 /// The exact orbits of a scene at phase resonance, one by one, in the numbers of its oscillator or driven mode.

@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let no_structure = || Failure::input("the scene has no [structure]: its host is one oscillator, see `vines orbit`");
     let structure = scene.structure.as_ref().ok_or_else(no_structure)?;
     let bar = progress_bar(Survey::ORBITS as u64, "computing the backbone", "orbits");
-    let survey = Survey::with(&scene, &|| {
+    let survey = Survey::of(&scene, &|| {
         bar.inc(1);
         if bar.position() > bar.length().unwrap_or(0) {
             bar.inc_length(Survey::ORBITS as u64);

@@ -104,7 +104,7 @@ fn a_lock_behind_a_shaker_states_its_force_in_newtons_and_its_command_in_volts()
     assert!((unit.in_metres(u_force) / d.amplitude(lock.at.u_g) - 1.0).abs() < 1e-12);
     assert!(lock.at.e_m.is_none() && lock.at.u_e_m.is_none());
     // The exact orbits of structure and shaker state both.
-    let orbits = Survey::of(&scene).unwrap().orbits;
+    let orbits = Survey::of(&scene, &|| ()).unwrap().orbits;
     let apart = |orbit: &StructureOrbit| (orbit.omega / (TAU * lock.at.f_hz) - 1.0).abs();
     let exact = orbits
         .iter()
@@ -311,7 +311,7 @@ fn exact_orbits_with_a_shaker_are_motions_of_the_plant() {
 fn measured_harmonics_of_the_force_are_those_of_the_exact_orbits_under_a_voltage() {
     // From other levels the loop may fall into the asymmetric motion that exists beside the symmetric one.
     let scene = preset(0, "C_to = 0.16 -> C_to = 0.44 ;; points = 18 -> points = 3").unwrap();
-    let exact = Survey::of(&scene).unwrap().behind_shaker;
+    let exact = Survey::of(&scene, &|| ()).unwrap().behind_shaker;
     let b = scene.units().response.of_metres(scene.plant.half_width);
     let points = tracked_of(&scene).points;
     assert_eq!(points.len(), 3);

@@ -333,7 +333,7 @@ fn shapes_that_are_not_mass_normalised_are_refused_with_their_norm() {
 
 #[test]
 fn the_presets_say_which_mode_takes_the_stability_of_the_1_1_motion() {
-    let survey = |name: &str| Survey::of(&preset(name, &[]).unwrap()).unwrap();
+    let survey = |name: &str| Survey::of(&preset(name, &[]).unwrap(), &|| ()).unwrap();
     // The study's operating point is unstable on a cantilever, and symmetry breaks through its third mode.
     let cantilever = survey("cantilever");
     assert!(cantilever.orbits.iter().all(|orbit| !orbit.stability.stable));
@@ -504,7 +504,12 @@ fn matrices_are_plain_tables_of_any_delimiter() {
 
 #[test]
 fn all_orbits_of_a_structure_are_found_also_outside_the_frequencies_of_the_controller() {
-    let count = |range: [&str; 2]| Survey::of(&preset("frame", &range).unwrap()).unwrap().orbits.len();
+    let count = |range: [&str; 2]| {
+        Survey::of(&preset("frame", &range).unwrap(), &|| ())
+            .unwrap()
+            .orbits
+            .len()
+    };
     let narrow = count(["controller.omega_min=0.999", "controller.omega_max=1.001"]);
     let wide = count(["controller.omega_min=0.5", "controller.omega_max=1.8"]);
     assert_eq!(narrow, wide);
