@@ -75,16 +75,17 @@ fn symbol_of(unit: &str) -> &'static str {
     if unit == "N" { "F" } else { "E" }
 }
 
-/// A drive beside the requested amplitude, both in the unit of the latter, in words.
-fn drive_in_words(drive: Drive, requested: Quantity) -> String {
-    let Quantity { value: requested, unit } = requested;
-    let (symbol, present) = (symbol_of(unit), if unit == "N" { "force" } else { "displacement" });
-    let (of, value) = match drive.amplitude {
+/// A drive in metres of the oscillator beside the requested amplitude, in the unit of the reference, in words.
+fn drive_in_words(drive: Drive, plan: &Plan) -> String {
+    let unit = plan.knowledge.target.units.reference;
+    let symbol = symbol_of(unit.symbol);
+    let present = if symbol == "F" { "force" } else { "displacement" };
+    let (of, metres) = match drive.amplitude {
         0.0 => (format!("{symbol} = 0, but a {present} of"), drive.displacement.abs()),
         amplitude => (format!("{symbol} ="), amplitude),
     };
-    let share = short(value / requested);
-    format!("{of} {}, {share} times the requested drive", Quantity { value, unit })
+    let share = short(metres / plan.amplitude);
+    format!("{of} {}, {share} times the requested drive", unit.quantity(metres))
 }
 
 /// A limit of the response in words: as the scene states it, the displacement at the sensor in m, and of what else a sensor reads, the reading.
@@ -146,28 +147,22 @@ pub enum ExperimentError {
     #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
     OtherThanAsked { departure: String, error: Box<Self> },
     #[error(
-        "the controller does not release the drive: {periods:.1} periods after `active` became false, it commands {}. A ramp may take {allowed:.1} \
-         periods, in which a free response falls to {} %; the drive is off",
-        drive_in_words(*drive, *requested), 100.0 * DECAYED
+        "the controller does not release the drive: {periods:.1} periods after `active` became false, it commands {commanded}. A ramp may take no longer, \
+         because a free response falls to {} % in this time; the drive is off",
+        100.0 * DECAYED
     )]
     NotReleased {
         /// Natural periods.
         periods: f64,
-        allowed: f64,
-        /// In the unit of the requested drive.
-        drive: Drive,
-        requested: Quantity,
+        commanded: String,
     },
     #[error(
-        "the controller drives again: {periods:.1} periods after it released the drive, it commands {}; the drive is off",
-        drive_in_words(*drive, *requested)
+        "the controller drives again: {periods:.1} periods after it released the drive, it commands {commanded}; the drive is off"
     )]
     DrivesAgain {
         /// Natural periods.
         periods: f64,
-        /// In the unit of the requested drive.
-        drive: Drive,
-        requested: Quantity,
+        commanded: String,
     },
     #[error("the scene has no drive, so that nothing can lock")]
     NoDrive,
@@ -373,8 +368,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             samples.push(*sample);
             let is_off = is_off(command.drive);
             if stage == Stage::Decaying && !is_off {
-                let (drive, requested) = beside_requested(command.drive, plan);
-                return Err(ExperimentError::DrivesAgain { periods: since_release, drive, requested });
+                let commanded = drive_in_words(command.drive, plan);
+                return Err(ExperimentError::DrivesAgain { periods: since_release, commanded });
             }
             if (active || !is_off) && !is_latched(&command) {
                 guard(config, &target, sample.sensors.response, command.drive)?;
@@ -415,9 +410,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
                 return Ok(self.taken - 1);
             }
         }
-        let allowed = self.natural_periods(ramp);
-        let (drive, requested) = beside_requested(self.last.drive, self.plan);
-        Err(ExperimentError::NotReleased { periods: allowed, allowed, drive, requested })
+        let commanded = drive_in_words(self.last.drive, self.plan);
+        Err(ExperimentError::NotReleased { periods: self.natural_periods(ramp), commanded })
     }
 
     /// Samples so far, and of these the ones with the command of a shaker at the limit of its amplifier.
@@ -543,15 +537,6 @@ impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
 /// Whether a drive moves nothing: neither a rig that takes its amplitude nor one that takes its samples.
 fn is_off(drive: Drive) -> bool {
     drive.amplitude == 0.0 && drive.displacement == 0.0
-}
-
-/// A drive in metres of the oscillator, and the requested amplitude: both in the unit of the reference.
-fn beside_requested(drive: Drive, plan: &Plan) -> (Drive, Quantity) {
-    let unit = plan.knowledge.target.units.reference;
-    (
-        drive.map(|metres| unit.of_metres(metres)),
-        unit.quantity(plan.amplitude),
-    )
 }
 
 /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
