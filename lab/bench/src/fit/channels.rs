@@ -9,28 +9,19 @@ use super::recording::{Recording, RecordingError};
 use vines_rig::unit;
 use vines_scene::scene::table::{Channel, Contents};
 
-/// What the names and units of a channel say.
-trait Named {
-    /// The last part of its path.
-    fn last(&self) -> &str;
-    /// Whether it has the usual name of a time.
-    fn is_named_time(&self) -> bool;
-    /// Whether it is a time by its unit.
-    fn is_time(&self) -> bool;
+/// The last part of the path of a channel.
+fn last(channel: &Channel) -> &str {
+    channel.name.rsplit(['/', '.']).next().unwrap_or("")
 }
 
-impl Named for Channel {
-    fn last(&self) -> &str {
-        self.name.rsplit(['/', '.']).next().unwrap_or("")
-    }
+/// Whether a channel has the usual name of a time.
+fn is_named_time(channel: &Channel) -> bool {
+    ["time", "t", "timestamp", "x_value"].contains(&&*last(channel).to_lowercase())
+}
 
-    fn is_named_time(&self) -> bool {
-        TIMES.contains(&&*self.last().to_lowercase())
-    }
-
-    fn is_time(&self) -> bool {
-        unit::parse(&self.unit, "").is_some_and(|(_, unit)| unit == "s")
-    }
+/// Whether a channel is a time by its unit.
+fn is_time(channel: &Channel) -> bool {
+    unit::parse(&channel.unit, "").is_some_and(|(_, unit)| unit == "s")
 }
 
 /// Which channels of a file are a recording. A channel is its name, or its number from 1, and after a colon its unit, the sensitivity of its sensor,
@@ -50,8 +41,6 @@ pub struct Selection {
     pub late: Option<f64>,
 }
 
-/// Usual names of the time.
-const TIMES: [&str; 4] = ["time", "t", "timestamp", "x_value"];
 /// Residual of the clock over a step below which the samples count as even: then interpolation changes nothing that noise does not hide.
 const EVEN: f64 = 1e-3;
 /// A step over the 99th percentile of all steps from which samples are missing.
@@ -211,7 +200,7 @@ impl File<'_> {
     fn find(&self, name: &str) -> Result<Option<&Channel>, RecordingError> {
         let name = name.trim().trim_start_matches('/');
         let has_one = self.channels.iter().any(|channel| channel.name == name);
-        let is_it = |channel: &Channel| name == if has_one { &channel.name } else { channel.last() };
+        let is_it = |channel: &Channel| name == if has_one { &channel.name } else { last(channel) };
         let mut found = (0..self.channels.len()).filter(|n| is_it(&self.channels[*n]));
         let (first, second) = (found.next(), found.next());
         if let Some((one, other)) = first.zip(second) {
@@ -369,9 +358,9 @@ impl File<'_> {
     /// The channel of the time, s.
     fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Channel>, RecordingError> {
         // A `T [°C]` is no time.
-        let named = |channel: &&Channel| channel.is_named_time() && (channel.unit.is_empty() || channel.is_time());
+        let named = |channel: &&Channel| is_named_time(channel) && (channel.unit.is_empty() || is_time(channel));
         let all = |is_it: &dyn Fn(&&Channel) -> bool| self.channels.iter().filter(|one| is_it(one)).collect::<Vec<_>>();
-        let kinds = [all(&named), all(&|one| one.is_time()), all(&|one| one.is_named_time())];
+        let kinds = [all(&named), all(&|one| is_time(one)), all(&|one| is_named_time(one))];
         let mut usual = kinds.into_iter().find(|kind| !kind.is_empty()).into_iter().flatten();
         let (first, second) = (usual.next(), usual.next());
         if let (None, Some(first), Some(second)) = (&selection.time, first, second) {
