@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, SymmetricEigen};
 use num_complex::Complex64;
 
-use super::FILE_ROUNDING;
+use super::{FILE_ROUNDING, place};
 use crate::scene::table::{Channel, Contents, plain_table};
 
 /// The columns of the plain table under `key`: numbers under the names of points.
@@ -207,31 +207,20 @@ impl Residues {
             .iter()
             .map(|point| Ok([column(&format!("re {point}"))?, column(&format!("im {point}"))?]));
         let places = places.collect::<Result<Vec<_>, String>>()?;
-        let known = || points.join(", ");
         let reference = reference.ok_or_else(|| {
             format!(
                 "`reference` is missing: name the point at which the force of the modal test acted, one of {}",
-                known()
+                points.join(", ")
             )
         })?;
-        let driven = points.iter().position(|point| point == reference).ok_or_else(|| {
-            format!(
-                "reference = \"{reference}\" is no point of the structure; its points are {}",
-                known()
-            )
-        })?;
+        let driven = place(&points, "reference", reference)?;
         let mut poles = Vec::new();
         for (n, (&hertz, &zeta)) in frequency.iter().zip(damping).enumerate() {
             let number = n + 1;
-            if zeta >= 1.0 {
+            if hertz <= 0.0 || !(0.0..1.0).contains(&zeta) {
                 return Err(format!(
-                    "mode {number} has the damping ratio {zeta}: critical or more, and a mode must oscillate; the ratio must be below 1"
-                ));
-            }
-            if hertz <= 0.0 || zeta < 0.0 {
-                return Err(format!(
-                    "mode {number} of {title} has {hertz} Hz and the damping ratio {zeta}: the frequency must be positive, the ratio at least 0; leave out \
-                     rigid-body modes (0 Hz)"
+                    "mode {number} of {title} has {hertz} Hz and the damping ratio {zeta}: the frequency must be positive, the ratio at least 0 and below 1, \
+                     because a mode must oscillate; leave out rigid-body modes (0 Hz)"
                 ));
             }
             let omega = std::f64::consts::TAU * hertz;
