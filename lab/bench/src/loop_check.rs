@@ -10,7 +10,7 @@
 
 mod shaker;
 
-use std::f64::consts::{FRAC_PI_4, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use nalgebra::Vector2;
 use num_complex::Complex64;
@@ -474,8 +474,6 @@ fn noise_of(readings: &[[f64; 3]], of: usize, target: &Target, step: f64) -> f64
 const FACTOR: f64 = 0.05;
 /// Largest unexplained phase of the response relative to the base, degrees. On the default scene 1 degree shifts sigma by 0.026.
 const PHASE: f64 = 1.0;
-/// Largest relative difference of the clocks: later measurements of frequencies in hertz would be wrong by it.
-const CLOCK: f64 = 1e-3;
 /// Relative differences of natural frequency and damping from which they are reported, beyond their uncertainty.
 const NOTED: [f64; 2] = [1e-4, 0.02];
 
@@ -546,7 +544,8 @@ fn quantities_of_base(base: &Fitted, u: f64, drive: f64, plan: &Plan) -> [Checke
     let clock = [base.found.pole.im / omega, u_clock, 1.0];
     let (name, gain) = ("frequency of the base over that of the drive", [ratio, u * ratio, 1.0]);
     [
-        quantity(name, "", clock, CLOCK, Some(Verdict::Clock)),
+        // Beyond that, later measurements of frequencies in hertz would be wrong.
+        quantity(name, "", clock, 1e-3, Some(Verdict::Clock)),
         quantity("base over drive", "", gain, tolerance, Some(Verdict::BaseGain)),
     ]
 }
@@ -578,8 +577,6 @@ const NOISE: f64 = 0.15;
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
 const GAIN: f64 = 2.0;
-/// Deviation of the phase, rad, up to which a channel is in time, or reversed, or exchanged: the nearest quarter of a turn.
-const IN_TIME: f64 = FRAC_PI_4;
 
 /// A channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -677,7 +674,8 @@ impl LoopCheck {
             .base
             .unwrap_or(CheckedChannel { gain: 1.0, ..CheckedChannel::default() });
         let is_near = |gain: f64| (1.0 / GAIN..GAIN).contains(&gain);
-        let is_at = |phase: f64, degrees: f64| ((phase - degrees).to_radians().sin_cos().1) > IN_TIME.cos();
+        // In the nearest quarter of a turn a channel is in time, or reversed, or exchanged.
+        let is_at = |phase: f64, degrees: f64| (phase - degrees).to_radians().cos() > FRAC_1_SQRT_2;
         let is_noisy = |channel: &CheckedChannel, expected: f64| channel.noise > NOISE * channel.gain * expected;
         let dead = [response, base].map(|channel| channel.gain < DEAD);
         // Exchanged sensors read each other's signal. The response's converter may be too coarse for the motion of the base.

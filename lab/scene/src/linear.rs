@@ -91,12 +91,6 @@ impl MeasuredLinear {
 
 /// Largest mass ratio of a rig over the ratio in its drawing, whose masses are known within a fifth.
 const LARGEST_RATIO: f64 = 1.0 / (1.0 - 0.2);
-/// Smallest distance of a stable symmetric 1:1 motion from the disc of motions without impacts: of `|χ| > 1` and `|χ - 1| > 1` to `|χ - 1/2| <= 1/2`, it is
-/// `(sqrt(3) - 1)/2`.
-const LEAST_DISTANCE: f64 = 0.366;
-/// Largest third harmonic of the force of sliding friction over the force that carries the particle: of a square wave, whose height is at most
-/// that force.
-const FRICTION_THIRD: f64 = 4.0 / (3.0 * PI);
 
 /// Whether walls must have touched the particle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -145,11 +139,12 @@ pub fn impacts_by_resonance(
     ];
     let uncertainty = Estimate::new(0.0, &parts).uncertainty * 2.0 / linear.omega0;
     // The disc of every particle up to the largest one, added to the state in which the linear response was measured. Of an unknown state, motions without
-    // impacts are as far away as the diameter of the disc, and those with impacts as near as `LEAST_DISTANCE`.
+    // impacts are as far away as the diameter of the disc, and those with impacts as near as `|χ| > 1` and `|χ - 1| > 1` are to `|χ - 1/2| <= 1/2`.
+    let nearest = 0.5 * (3_f64.sqrt() - 1.0);
     let (centre, radii) = match linear.particle {
         ParticleState::Free => (0.5, [LARGEST_RATIO - 0.5; 2]),
         ParticleState::Carried => (-0.5, [LARGEST_RATIO - 0.5; 2]),
-        ParticleState::Unknown => (0.0, [LEAST_DISTANCE / LARGEST_RATIO, LARGEST_RATIO]),
+        ParticleState::Unknown => (0.0, [nearest / LARGEST_RATIO, LARGEST_RATIO]),
     };
     beyond(
         (added - centre * epsilon).norm(),
@@ -161,11 +156,9 @@ pub fn impacts_by_resonance(
 /// What the third harmonic of the structure's motion says of impacts: the force that excites it, over the force of the mass M in the fundamental.
 #[must_use]
 pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
-    beyond(
-        third.value,
-        third.uncertainty,
-        [FRICTION_THIRD * LARGEST_RATIO * epsilon; 2],
-    )
+    // Of sliding friction it is at most that of a square wave as high as the force that carries the particle.
+    let friction = 4.0 / (3.0 * PI) * LARGEST_RATIO * epsilon;
+    beyond(third.value, third.uncertainty, [friction; 2])
 }
 
 /// Resolution of a stated point: of response and drive, relative, and of the frequency over the half-power bandwidth. No sensor and no drawing shows

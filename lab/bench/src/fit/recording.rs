@@ -68,15 +68,8 @@ impl RecordingError {
     }
 }
 
-/// Periods within which a constant hardly drifts.
+/// Periods within which a constant hardly drifts, and fewest periods of a recording.
 const SLOW: usize = 16;
-/// How often the drift of an integral is removed: twice leaves of noise at a quarter of the natural frequency, which two integrals raise sixteen times, as
-/// much as of noise near it.
-const DRIFT_PASSES: usize = 2;
-/// Periods at each end over which running means do not reach.
-const EDGE: f64 = 0.5 * (SLOW + 3) as f64;
-/// Fewest periods of a recording.
-const FEWEST_PERIODS: f64 = 16.0;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
 /// Fewest periods of a decay, and periods of the pieces whose damping is compared.
@@ -240,9 +233,9 @@ impl Recording {
             ));
         }
         let (seconds, periods) = (count as f64 * sample_time, count as f64 * sample_time * hertz);
-        if periods < FEWEST_PERIODS {
+        if periods < SLOW as f64 {
             return refused(format!(
-                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST_PERIODS} are needed"
+                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {SLOW} are needed"
             ));
         }
         for ((values, channel), measurand) in both.into_iter().zip(channels).zip(self.measurands) {
@@ -317,8 +310,8 @@ impl Recording {
         let readings = [passed(0, &one.response), passed(1, &one.drive)];
         let natural = knowledge.linear.omega0 * sample_time;
         let [response, base] = [0, 1].map(|channel| displacements(&readings[channel], measurands[channel], natural));
-        // At both ends the drift is not known.
-        let margin = (EDGE * (TAU / knowledge.linear.omega0 / sample_time).round()) as usize;
+        // At both ends the drift is not known: running means do not reach there.
+        let margin = (0.5 * (SLOW + 3) as f64 * (TAU / knowledge.linear.omega0 / sample_time).round()) as usize;
         let inner = margin..response.len().saturating_sub(margin).max(margin);
         let signals = Signals {
             response: &response[inner.clone()],
@@ -541,8 +534,9 @@ fn displacements(values: &[f64], of: Measurand, natural: f64) -> Vec<f64> {
             sum += (0.5 * natural).tan() * (before + *value);
             (before, *value) = (*value, sum);
         }
-        // An integral raises the noise below the natural frequency.
-        for _ in 0..DRIFT_PASSES {
+        // An integral raises the noise below the natural frequency. Twice leaves of noise at a quarter of it, which two integrals raise sixteen times, as
+        // much as of noise near it.
+        for _ in 0..2 {
             remove_drift(&mut values, (TAU / natural).round() as usize, 1);
         }
     }

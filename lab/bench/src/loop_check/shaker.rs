@@ -15,7 +15,7 @@ use super::{
     first_of, noise_of, of_response, quantity,
 };
 use crate::rig::{Rig, RigError, Scaled};
-use vines_scene::linear::{LinearResponse, ParticleState};
+use vines_scene::linear::{LinearResponse, POINT_RESOLUTION, ParticleState};
 use vines_scene::plan::Plan;
 use vines_scene::scene::{PLACES, frequencies};
 use vines_scene::shaker_path::ShakerPath;
@@ -23,8 +23,6 @@ use vines_scene::shaker_path::ShakerPath;
 /// Periods of a window, and most periods at a frequency.
 const STEADY_WINDOW: usize = 16;
 const MOST_PERIODS: f64 = 800.0;
-/// Largest relative change from window to window of a steady motion.
-const STEADY_CHANGE: f64 = 1e-4;
 
 /// Largest relative error of the model of reference over command. The control is stable below 1 (small gain: its closed loop is at most 1); half of
 /// it is a gain margin of 2.
@@ -131,11 +129,11 @@ impl Steady {
             // A heavy table on the suspension of a light armature floats for hundreds of periods: a parabola in a window.
             let both =
                 [1, 2].map(|channel| sine.fitted(&rig.readings, channel, 0.5 * samples as f64, 2, &[sine.pole()]));
-            // What noise makes of a steady motion is no change.
+            // A steady motion changes from window to window by no more than a point resolves; what noise makes of it is no change.
             let changes = |one: &Fitted| {
                 let noise = noise_of(&rig.readings, one.channel, &rig.target, rig.step);
                 let u = noise * one.found.u(&[Complex64::ZERO, Complex64::ONE]);
-                (one.found.pole - sine.pole()).norm() * duration > STEADY_CHANGE + SIGNIFICANT * u * duration
+                (one.found.pole - sine.pole()).norm() * duration > POINT_RESOLUTION + SIGNIFICANT * u * duration
             };
             if !both.iter().any(changes) || periods >= MOST_PERIODS {
                 return Ok(Self {
@@ -211,7 +209,7 @@ impl Curve {
         LinearResponse {
             omega0: self.natural,
             damping_rate: self.damping,
-            uncertainty: self.u_rate.max(NOTED[0] * STEADY_CHANGE * self.natural),
+            uncertainty: self.u_rate.max(NOTED[0] * POINT_RESOLUTION * self.natural),
             gain: Complex64::new(self.damping / self.natural, 1.0) / self.slope,
             u_gain: self.u_gain,
             particle: ParticleState::Unknown,
@@ -223,7 +221,7 @@ impl Curve {
 
 /// What the shaker makes of its command: `gain`, reference over command at the natural frequency, and the largest relative error of the model of it.
 fn of_reference(path: &ShakerPath, stated: &ShakerPath, gain: f64, error: f64) -> [CheckedQuantity; 4] {
-    let u = |measured: f64| STEADY_CHANGE * measured.abs();
+    let u = |measured: f64| POINT_RESOLUTION * measured.abs();
     let [drop_out, dropped] = [path, stated].map(ShakerPath::drop_out);
     let [turn, turned] = [path, stated].map(|one| one.turn().to_degrees());
     let names = [
@@ -238,6 +236,6 @@ fn of_reference(path: &ShakerPath, stated: &ShakerPath, gain: f64, error: f64) -
         quantity(names[0], "", [gain, u(gain), 1.0], FACTOR, None),
         quantity(names[1], "", [drop_out, u(drop_out), dropped], FACTOR * dropped, None),
         quantity(names[2], "degrees", [turn, u(turn), turned], PHASE, None),
-        quantity(names[3], "", [error, STEADY_CHANGE, 0.0], ROBUST, refused),
+        quantity(names[3], "", [error, POINT_RESOLUTION, 0.0], ROBUST, refused),
     ]
 }

@@ -103,8 +103,6 @@ impl RigFault {
 
 /// Healthy readings that are kept, in hundredths of a natural period: more than one period.
 const READINGS_KEPT: usize = 128;
-/// A natural frequency that is a tenth higher needs this many times the stiffness.
-const STIFFER: f64 = 1.21;
 
 /// The plant of a scene, whose sensors, shaker, structure or clock fail.
 struct Faulty {
@@ -153,7 +151,8 @@ pub fn faulty(
         let measured = Measured::new(plant, scene.resonance, &scene.plant);
         Ok(Box::new(measured.compensating(Some(structure))))
     };
-    let changed = (fault == RigFault::Structure).then(|| plant(STIFFER * scene.plant.stiffness));
+    // A natural frequency that is a tenth higher.
+    let changed = (fault == RigFault::Structure).then(|| plant(1.21 * scene.plant.stiffness));
     let (begins, units) = ((seconds / scene.sample_time()) as usize, scene.units());
     let rig = Faulty {
         rig: plant(scene.plant.stiffness)?,

@@ -296,26 +296,21 @@ impl Scene {
     }
 }
 
-/// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
+/// The lock criterion: phase errors up to 0.3 degrees, and the drifts that are left near the steady state, at the rate at which the response approaches
+/// it. The frequency is within 2e-4 of the half-power bandwidth of the linear response, and the amplitude within 8e-5 of itself; noise widens both.
 fn lock_criterion(linear: &LinearResponse) -> LockCriterion {
     let bandwidth = linear.bandwidth().max(BANDWIDTH_MIN);
     let approached = PI * bandwidth;
     LockCriterion {
-        phase_tolerance: PHASE_TOLERANCE.to_radians(),
-        frequency_drift: FREQUENCY_TOLERANCE * bandwidth * approached,
-        amplitude_drift: AMPLITUDE_TOLERANCE * approached,
+        phase_tolerance: 0.3_f64.to_radians(),
+        frequency_drift: 2e-4 * bandwidth * approached,
+        amplitude_drift: 8e-5 * approached,
         ..LockCriterion::default()
     }
 }
 
 /// Bandwidth at which the loops are weakly coupled, over the cube root of E/A.
 const COUPLED: f64 = 0.9;
-/// Largest phase error that counts as locked, degrees.
-const PHASE_TOLERANCE: f64 = 0.3;
-/// Distances from the steady state that count as settled: of the frequency, over the half-power bandwidth of the linear response, and of the
-/// response amplitude, relative. Judged by the drift and the rate at which the steady state is approached; noise widens them.
-const FREQUENCY_TOLERANCE: f64 = 2e-4;
-const AMPLITUDE_TOLERANCE: f64 = 8e-5;
 /// Largest drive of a tracked backbone, base amplitude over `b epsilon`, without `phase_lock.amplitude_max`.
 const TRACKED: f64 = 4.0;
 /// Smallest half-power bandwidth over omega0 that counts for the lock criterion and the largest drive: with less, most of the energy is lost in
