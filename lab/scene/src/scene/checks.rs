@@ -66,9 +66,6 @@ pub(super) fn check(scene: &Scene, origin: &str) -> Result<(), SceneError> {
 
 use Range::{If, NotNegative, Positive, Within};
 
-/// Most samples of one record: about 3 GiB in memory.
-const MOST_SAMPLES: f64 = 2e7;
-
 /// Rows of a scene: key = value, unit, what is allowed.
 macro_rules! rows {
     ($scene:ident: $($key:literal = $value:expr, $unit:expr, $range:expr;)*) => {
@@ -80,7 +77,8 @@ macro_rules! rows {
 const ROWS: &[fn(&Scene) -> Row] = rows! { s:
     "controller.omega_min" = s.controller.omega_min, "(omega0)", Positive;
     "controller.omega_max" = s.controller.omega_max, "(omega0)", above_omega_min(s);
-    "controller.samples_per_period" = s.controller.samples_per_period, "(samples)", sampled(s);
+    "controller.samples_per_period" = s.controller.samples_per_period, "(samples)",
+        Within([s.controller.fewest_samples(), 1e5]);
     "controller.bandwidth" = s.controller.bandwidth, "(omega0)", as_sampled(s);
     "controller.phase_target" = s.controller.phase_target, "degrees", in_degrees(s.controller.phase_target);
     "backbone.C_from" = s.backbone.c_from, "(over b)", Positive;
@@ -90,17 +88,21 @@ const ROWS: &[fn(&Scene) -> Row] = rows! { s:
     // At least enough to count impacts and measure.
     "record.hold_periods" = s.record.hold_periods, "(natural periods)", Within([3.0, 1e6]);
     "record.decay_periods" = s.record.decay_periods, "(natural periods)", Positive;
-    "samples of phase_lock.acquire_timeout and of all periods of [record]" = samples_of_record(s), "samples", in_memory(s);
+    // About 3 GiB in memory.
+    "samples of phase_lock.acquire_timeout and of all periods of [record]" = samples_of_record(s), "samples",
+        If(samples_of_record(s) <= 2e7, "must be at most 20 million".into());
     "chain.adc_bits" = s.chain.adc_bits.map(f64::from), "bits", Within([1.0, 32.0]);
     "chain.dac_bits" = s.chain.dac_bits.map(f64::from), "bits", Within([1.0, 32.0]);
-    "chain.dac_bits" = s.chain.dac_bits.map(f64::from), "bits", with_hold(s);
+    "chain.dac_bits" = s.chain.dac_bits.map(f64::from), "bits",
+        If(s.chain.hold, "needs chain.hold = true: only samples of the drive can be quantised".into());
     "chain.response_range" = s.chain.response_range, "(over b)", Positive;
     "chain.base_range" = s.chain.base_range, "(over b epsilon)", Positive;
     "chain.base_range" = s.chain.base_range, "(over b epsilon)", above_drive(s);
     "chain.snr" = s.chain.snr, "dB", Within([-40.0, 300.0]);
     "chain.response_noise" = s.chain.response_noise, s.reading_units()[0], NotNegative;
     "chain.reference_noise" = s.chain.reference_noise, s.reading_units()[1], NotNegative;
-    "chain.reference_noise" = s.chain.reference_noise, s.reading_units()[1], with_sensor(s);
+    "chain.reference_noise" = s.chain.reference_noise, s.reading_units()[1],
+        If(s.chain.reference, "needs chain.reference = true: no sensor reads the reference".into());
     // Up to half the sampling frequency.
     "chain.filter" = s.chain.filter, "(omega0)", Within([2.0, 0.5 * s.controller.samples_per_period]);
     "chain.jitter" = s.chain.jitter, "samples", Within([0.0, 0.1]);
@@ -110,10 +112,6 @@ const ROWS: &[fn(&Scene) -> Row] = rows! { s:
 fn above_omega_min(scene: &Scene) -> Range {
     let [low, high] = [scene.controller.omega_min, scene.controller.omega_max];
     If(high > low, format!("must be above omega_min = {low}"))
-}
-
-fn sampled(scene: &Scene) -> Range {
-    Within([scene.controller.fewest_samples(), 1e5])
 }
 
 fn as_sampled(scene: &Scene) -> Range {
@@ -129,27 +127,10 @@ fn samples_of_record(scene: &Scene) -> f64 {
     (longest / scene.sample_time()).round() + scene.controller.samples_per_period * periods
 }
 
-fn in_memory(scene: &Scene) -> Range {
-    If(
-        samples_of_record(scene) <= MOST_SAMPLES,
-        "must be at most 20 million".into(),
-    )
-}
-
-fn with_hold(scene: &Scene) -> Range {
-    let allowed = "needs chain.hold = true: only samples of the drive can be quantised";
-    If(scene.chain.hold, allowed.into())
-}
-
 fn above_drive(scene: &Scene) -> Range {
     let drive = scene.dimensionless().g;
     let allowed = format!("must be at least G = {drive:.6}, or the converter of the base saturates");
     If(scene.amplitude <= scene.drive_range(), allowed)
-}
-
-fn with_sensor(scene: &Scene) -> Range {
-    let allowed = "needs chain.reference = true: no sensor reads the reference";
-    If(scene.chain.reference, allowed.into())
 }
 
 /// As the controller checks it; here the keys of a scene are at hand.
