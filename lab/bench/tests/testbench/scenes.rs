@@ -147,8 +147,11 @@ fn a_mistake_in_a_file_is_reported_with_its_line_and_missing_and_mixed_keys_with
         ("", "my.toml | [plant] has no | epsilon"),
         ("[plant]\nM = 1\nr = 0.5", "[plant] has no `k`"),
         ("[plant]\nM = 1\nepsilon = 0.5", "mixes"),
-        (plant, "neither of G"),
-        (&format!("{plant}[excitation]\nG = 1\nE = 1"), "both of G"),
+        (plant, "[excitation] has no key"),
+        (
+            &format!("{plant}[excitation]\nG = 1\nE = 1"),
+            "[excitation] has G and E | give either G",
+        ),
     ] {
         says(Scene::parse("my.toml", text, &[]), parts);
     }

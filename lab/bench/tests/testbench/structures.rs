@@ -264,7 +264,7 @@ tip = 0.51252 -> tip = inf => mode 1 (8.8156 Hz) has the shape at tip = inf | fi
 excitation = "force" -> excitation = "base" => no participation
 m = 0.032 -> m = 0.032\nk = 1e4 => [plant] has `k` beside [structure]
 F = 1.2 -> E = 1e-4 => [excitation] | F (N)
-F = 1.2 -> F = 1.2\nG = 1 => [excitation] has more than one
+F = 1.2 -> F = 1.2\nG = 1 => [excitation] has G and F
 [excitation] -> [resonance]\nreference = "force"\n[excitation] => resonance.reference | beside [structure]
 [excitation] -> [start]\nq1 = 0.1\n[excitation] => a structure starts at rest
 "#;

@@ -277,34 +277,29 @@ impl ExcitationSection {
             Excitation::Base => "E (m)",
             Excitation::Force => "F (N)",
         };
-        match (self.g, self.e, self.f, excitation) {
-            (Some(g), None, None, _) => {
-                Row::new("excitation.G", g, "(dimensionless)", Range::NotNegative).check()?;
-                Ok(d.amplitude(g))
-            }
-            (None, Some(e), None, Excitation::Base) => {
-                Row::new("excitation.E", e, "m", Range::NotNegative).check()?;
-                Ok(unit.in_metres(e))
-            }
-            (None, None, Some(f), Excitation::Force) => {
-                Row::new("excitation.F", f, "N", Range::NotNegative).check()?;
-                Ok(unit.in_metres(f))
-            }
-            (None, Some(_), None, _) | (None, None, Some(_), _) => Err(SceneError::text(
-                origin,
-                format!(
-                    "[excitation] does not fit the drive: give G (dimensionless) or {key}; E belongs to a base, F to a structure with excitation = \"force\""
-                ),
-            )),
-            (given, ..) => {
-                let given = match [given, self.e, self.f].iter().flatten().count() {
-                    0 => "neither",
-                    2 if structure.is_none() => "both",
-                    _ => "more than one",
+        let (row, amplitude) = match (self.g, self.e, self.f, excitation) {
+            (Some(g), None, None, _) => (("excitation.G", g, "(dimensionless)"), d.amplitude(g)),
+            (None, Some(e), None, Excitation::Base) => (("excitation.E", e, "m"), unit.in_metres(e)),
+            (None, None, Some(f), Excitation::Force) => (("excitation.F", f, "N"), unit.in_metres(f)),
+            (g, e, f, _) => {
+                let given = [("G", g), ("E", e), ("F", f)]
+                    .into_iter()
+                    .filter(|(_, value)| value.is_some());
+                let given: Vec<&str> = given.map(|(name, _)| name).collect();
+                let given = if given.is_empty() {
+                    "no key".into()
+                } else {
+                    given.join(" and ")
                 };
-                let one = format!("of G (dimensionless) and {key}: give exactly one, with G = E/(b epsilon)");
-                Err(SceneError::text(origin, format!("[excitation] has {given} {one}")))
+                let message = format!(
+                    "[excitation] has {given}: give either G (dimensionless), which is E/(b epsilon), or {key}; E belongs to a base, F to a structure \
+                     with excitation = \"force\""
+                );
+                return Err(SceneError::text(origin, message));
             }
-        }
+        };
+        let (key, value, unit) = row;
+        Row::new(key, value, unit, Range::NotNegative).check()?;
+        Ok(amplitude)
     }
 }
