@@ -10,7 +10,9 @@ use lovines::host::{Equations, Row, natural_modes};
 use lovines::oscillator::Oscillator;
 use lovines::{Host, Mode, Section};
 use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
+use vines_model::numerics::mean_square;
 
 use super::shaker::SceneShaker;
 use super::{Reference, SceneError};
@@ -681,11 +683,12 @@ impl StructureSection {
             return Parts::of_matrices(residues.points, Coupled::of_points(matrices, DVector::zeros(n)));
         }
         let Residues { points, poles } = residues;
+        let square = |shape: &[Complex64], of: fn(Complex64) -> f64| mean_square(shape.iter().copied().map(of));
         let modes = poles.iter().map(|(pole, shape)| StructureMode {
             omega: pole.norm(),
             zeta: -pole.re / pole.norm(),
             shape: shape.iter().map(|value| value.re).collect(),
-            out_of_phase: norm(shape.iter().map(|value| value.im)) / norm(shape.iter().map(|value| value.norm())),
+            out_of_phase: (square(shape, |value| value.im) / square(shape, Complex64::norm)).sqrt(),
             drive: 0.0,
         });
         let modes = modes.collect();
@@ -742,14 +745,6 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
         .iter()
         .fold(0.0_f64, |largest, value| largest.max(value.abs()));
     let is_node = |point: usize| mode.shape[point].abs() <= FILE_ROUNDING * largest;
-    if is_node(at.cavity) {
-        return Err(format!(
-            "the cavity at {} is at a node of the driven mode {number}, whose shape there is {:e} of its largest: no impact can drive it; choose another \
-             point or mode",
-            points[at.cavity],
-            mode.shape[at.cavity].abs() / largest
-        ));
-    }
     if at.drive.map_or(mode.drive == 0.0, is_node) {
         let place = at
             .drive
@@ -758,11 +753,18 @@ fn check(points: &[String], modes: &[StructureMode], driven: usize, at: &Places)
             "{place} does not drive mode {number}: its shape or participation there is 0; choose another point or mode"
         ));
     }
-    if is_node(at.sensor) {
-        return Err(format!(
-            "the sensor at {} is at a node of the driven mode {number}, and does not read it; choose another point or mode",
-            points[at.sensor]
-        ));
+    for (what, point, effect) in [
+        ("cavity", at.cavity, "no impact can drive it"),
+        ("sensor", at.sensor, "no motion of it is read"),
+    ] {
+        if is_node(point) {
+            return Err(format!(
+                "the {what} at {} is at a node of the driven mode {number}, whose shape there is {:e} of its largest: {effect}; choose another point or \
+                 mode",
+                points[point],
+                mode.shape[point].abs() / largest
+            ));
+        }
     }
     Ok(())
 }
@@ -809,9 +811,4 @@ fn equations(
 pub(super) fn rows(host: &Host, coordinates: &[Vec<f64>]) -> Result<Vec<Row>, String> {
     let rows = coordinates.iter().map(|point| host.row(point));
     rows.collect::<Result<_, _>>().map_err(|error| error.to_string())
-}
-
-/// Euclidean norm.
-fn norm(values: impl Iterator<Item = f64>) -> f64 {
-    values.map(|value| value * value).sum::<f64>().sqrt()
 }

@@ -105,21 +105,11 @@ impl Matrix {
         ))
     }
 
-    /// Eigenvalues, rising.
-    fn eigenvalues(&self) -> Vec<f64> {
-        let mut values: Vec<f64> = SymmetricEigen::new(self.values.clone())
-            .eigenvalues
-            .iter()
-            .copied()
-            .collect();
-        values.sort_by(f64::total_cmp);
-        values
-    }
-
     /// Refuses a matrix that is not positive definite, or, if it `may_be_singular`, not positive semidefinite, by its smallest eigenvalues. `zero`: what
     /// eigenvalues of zero mean, and what to do.
     fn checked(&self, unit: &str, may_be_singular: bool, zero: &str) -> Result<(), String> {
-        let values = self.eigenvalues();
+        let mut values = SymmetricEigen::new(self.values.clone()).eigenvalues.as_slice().to_vec();
+        values.sort_by(f64::total_cmp);
         let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let (title, count, smallest) = (self.title(), values.len(), values[0]);
         let rounding = f64::EPSILON * largest;
