@@ -92,7 +92,7 @@ impl Comparison {
         // The orbit that the lock followed, moved along the backbone to the measured C.
         let near = followed(&orbits, &lock)
             .map(|orbit| [orbit.sigma, orbit.b])
-            .or_else(|| Some(at_target.place(lock.at.c, lock.at.sigma, lock.at.g)?.1));
+            .or_else(|| at_target.place(lock.at.c, lock.at.sigma, lock.at.g));
         let exact = near.and_then(|near| at_target.orbits.with_amplitude(lock.at.c, near));
         // Without a drive, the decay is at phase resonance.
         let curve = match knowledge.is_at_phase_resonance() {
@@ -281,13 +281,13 @@ impl ExactCurve {
         at(&self.places, c).map(|[_, sigma, g, _]| [sigma, g])
     }
 
-    /// The distance of `(C, sigma, G)` from the polygon, and sigma and speed of the place with the same C, the nearest of several.
-    fn place(&self, c: f64, sigma: f64, g: f64) -> Option<(f64, [f64; 2])> {
+    /// Sigma and speed of the place on the polygon with the same C as `(C, sigma, G)`, the nearest of several.
+    fn place(&self, c: f64, sigma: f64, g: f64) -> Option<[f64; 2]> {
         let pairs = || self.compared.iter().flat_map(|places| places.windows(2));
         let away = |[_, exact, drive, _]: &Place| (sigma - exact).abs().max((g - drive).abs());
         let places = pairs().filter_map(|pair| at(pair, c));
         let [_, exact, _, speed] = places.min_by(|one, other| away(one).total_cmp(&away(other)))?;
-        Some((self.to_polygon([c, sigma, g])?, [exact, speed]))
+        Some([exact, speed])
     }
 
     /// The distance of `(C, sigma, G)` from the polygon.
@@ -304,7 +304,7 @@ impl ExactCurve {
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
         let polygon = self.to_polygon([c, sigma, g])?;
         let at = |c: f64, near: [f64; 2]| self.orbits.with_amplitude(c, near);
-        let same = self.place(c, sigma, g).and_then(|(_, near)| at(c, near));
+        let same = self.place(c, sigma, g).and_then(|near| at(c, near));
         let Some(same) = same else {
             return Some(Distance { nearest: polygon, sigma: None, g: None });
         };
@@ -531,7 +531,10 @@ mod tests {
             is_of_structure: true,
         };
         for (sigma, g, speed) in [(-1.1, 1.0, 0.9), (-0.4, 1.4, 0.7)] {
-            let (nearest, near) = curve.place(0.5, sigma, g).unwrap();
+            let (nearest, near) = (
+                curve.to_polygon([0.5, sigma, g]).unwrap(),
+                curve.place(0.5, sigma, g).unwrap(),
+            );
             assert!(nearest < 1e-12 && (near[0] - sigma).abs() < 1e-12 && (near[1] - speed).abs() < 1e-12);
         }
     }
