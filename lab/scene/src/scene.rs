@@ -263,12 +263,11 @@ impl Scene {
     /// with a tolerance that may be the rounding error of a number near 1.
     pub fn sample_time(&self) -> f64 {
         let exact = TAU / self.plant.natural_frequency() / self.controller.samples_per_period;
-        f64::from_bits((exact.to_bits() + DROPPED / 2) / DROPPED * DROPPED)
+        // Of 53 bits 22 are zero.
+        let multiple = 1_u64 << 22;
+        f64::from_bits((exact.to_bits() + multiple / 2) / multiple * multiple)
     }
 }
-
-/// Multiple of which the last bits of a sample time are: 22 of 53 are zero.
-const DROPPED: u64 = 1 << 22;
 
 // The sections of a scene as written, before they are completed and checked.
 
