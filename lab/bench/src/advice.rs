@@ -12,12 +12,6 @@ use crate::survey::{phase_resonant, stable_backbone};
 use vines_scene::plan::Plan;
 use vines_scene::scene::{Dimensionless, Measurand, Scene};
 
-/// The smallest and the largest drive of orbits.
-fn drives(orbits: &[Orbit]) -> Option<[f64; 2]> {
-    let (low, high) = range((f64::INFINITY, 0.0), orbits.iter().map(|orbit| orbit.g));
-    (low <= high).then_some([low, high])
-}
-
 /// Why a run that was expected to lock the symmetric 1:1 motion may not have done so.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(missing_docs, reason = "each variant explains its fields")]
@@ -91,7 +85,9 @@ pub fn reason(scene: &Scene, d: &Dimensionless, regime: Option<Regime>) -> Optio
     let mut stable = phase_resonant(scene, d);
     stable.retain(|orbit| orbit.stable);
     if stable.is_empty() {
-        return Some(Reason::Unstable { g: d.g, range: drives(&stable_backbone(scene, d)) });
+        let drives = stable_backbone(scene, d).into_iter().map(|orbit| orbit.g);
+        let (low, high) = range((f64::INFINITY, 0.0), drives);
+        return Some(Reason::Unstable { g: d.g, range: (low <= high).then_some([low, high]) });
     }
     let allowed = scene.controller.omega_min..=scene.controller.omega_max;
     if !stable.iter().any(|orbit| allowed.contains(&orbit.omega)) {

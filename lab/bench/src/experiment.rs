@@ -97,13 +97,6 @@ fn limit_in_words(limit: f64, target: &Target) -> String {
     }
 }
 
-/// What a lock waits for that the bench measures, in words.
-fn unmet_in_words(unmet: Option<&str>) -> String {
-    unmet.map_or_else(String::new, |unmet| {
-        format!("; the bench measures the lock, as the controller does not: {unmet}")
-    })
-}
-
 /// Why an experiment ended early.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
@@ -114,7 +107,7 @@ pub enum ExperimentError {
     Controller(#[from] ControllerError),
     #[error(
         "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s{}",
-        phase_in_words(*phase_error), unmet_in_words(unmet.as_deref())
+        phase_in_words(*phase_error), unmet.as_deref().unwrap_or_default()
     )]
     NoLock {
         periods: f64,

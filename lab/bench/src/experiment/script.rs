@@ -220,13 +220,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
 
     /// What keeps the bench from taking a motion under the constant drive as settled, in words.
     fn unmet(&self, estimate: &LevelEstimate) -> String {
-        match estimate.unsteady {
+        let unmet = match estimate.unsteady {
             Some(unsteady) => unsteady.to_string(),
             None => {
                 let Estimate { value, uncertainty } = estimate.at[0].scaled(1.0 / self.requested);
                 format!("the drive that holds the response is {value:.4} ± {uncertainty:.1e} times the requested one")
             }
-        }
+        };
+        format!("; the bench measures the lock, as the controller does not: {unmet}")
     }
 
     /// Closes the loop and begins to control the response.

@@ -1,6 +1,6 @@
 //! The `[chain]` section: the measurement chain between rig and controller, off by default.
 
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 use serde::{Deserialize, Serialize};
 
@@ -89,14 +89,11 @@ impl ChainSettings {
     /// sample.
     pub(crate) fn total_delay(&self, step: f64) -> f64 {
         let held = if self.hold { 0.5 } else { 0.0 };
-        (f64::from(self.delay) + held) * step + self.filter_delay()
-    }
-
-    /// Phase of the filter at omega0, as a delay in units of 1/omega0.
-    fn filter_delay(&self) -> f64 {
-        self.filter.map_or(0.0, |cut_off| {
+        // The phase of the filter at omega0.
+        let filter = self.filter.map_or(0.0, |cut_off| {
             let x = 1.0 / cut_off;
-            (std::f64::consts::SQRT_2 * x).atan2(1.0 - x * x)
-        })
+            (SQRT_2 * x).atan2(1.0 - x * x)
+        });
+        (f64::from(self.delay) + held) * step + filter
     }
 }
