@@ -648,9 +648,9 @@ impl StructureSection {
             if other.names != m.names {
                 return Err(format!(
                     "{} has the degrees of freedom {}, and {} has {}: all matrices need the same, in the same order",
-                    m.title(),
+                    m.title,
                     m.names.join(", "),
-                    other.title(),
+                    other.title,
                     other.names.join(", ")
                 ));
             }

@@ -50,8 +50,8 @@ fn table(folder: &Path, key: &str, file: &Path) -> Result<Vec<Channel>, String> 
 
 /// A square matrix with the names of its degrees of freedom.
 pub(super) struct Matrix {
-    key: String,
-    file: String,
+    /// Its key and its file, for messages.
+    pub title: String,
     pub names: Vec<String>,
     pub values: DMatrix<f64>,
 }
@@ -60,24 +60,13 @@ impl Matrix {
     pub(super) fn read(folder: &Path, key: &str, file: &Path) -> Result<Self, String> {
         let columns = table(folder, key, file)?;
         let (n, rows) = (columns.len(), columns[0].values.len());
+        let title = format!("{key} ({})", file.display());
         if rows != n {
-            return Err(format!(
-                "{key} ({}) has {n} columns and {rows} rows: it must be square",
-                file.display()
-            ));
+            return Err(format!("{title} has {n} columns and {rows} rows: it must be square"));
         }
         let values = DMatrix::from_fn(n, n, |row, column| columns[column].values[row]);
         let names = columns.into_iter().map(|column| column.name).collect();
-        Ok(Self {
-            key: key.into(),
-            file: file.display().to_string(),
-            names,
-            values,
-        })
-    }
-
-    pub(super) fn title(&self) -> String {
-        format!("{} ({})", self.key, self.file)
+        Ok(Self { title, names, values })
     }
 
     pub(super) fn symmetric(&self) -> Result<(), String> {
@@ -100,7 +89,7 @@ impl Matrix {
         Err(format!(
             "{} is not symmetric: its element ({first}, {second}) is {below}, and ({second}, {first}) is {above}; they differ by {:.1e} of its largest \
              element, and {FILE_ROUNDING:e} is allowed, which is rounding: write it with ten digits, or with the mean of both in both places",
-            self.title(),
+            self.title,
             worst / largest
         ))
     }
@@ -111,7 +100,7 @@ impl Matrix {
         let mut values = SymmetricEigen::new(self.values.clone()).eigenvalues.as_slice().to_vec();
         values.sort_by(f64::total_cmp);
         let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        let (title, count, smallest) = (self.title(), values.len(), values[0]);
+        let (title, count, smallest) = (&self.title, values.len(), values[0]);
         let rounding = f64::EPSILON * largest;
         let what = if may_be_singular { "semidefinite" } else { "definite" };
         let start =
