@@ -39,9 +39,7 @@ impl Unit {
     pub fn quantity(self, metres: f64) -> Quantity {
         Quantity { value: self.of_metres(metres), unit: self.symbol }
     }
-}
 
-impl Unit {
     /// A drive in this unit, as the motion of a base or as a force: in files they have different names.
     pub fn base_or_force<T>(self, drive: T) -> [Option<T>; 2] {
         match self.symbol {

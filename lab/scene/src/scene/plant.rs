@@ -103,11 +103,7 @@ impl PlantSection {
 
     /// The oscillator as a structure with one mode, on the table of a shaker or driven by its force.
     pub(super) fn take_oscillator(&mut self, origin: &str, shaker: &ShakerSection) -> Result<Structure, SceneError> {
-        let excitation = if shaker.has_table() {
-            Excitation::Base
-        } else {
-            Excitation::Force
-        };
+        let excitation = shaker.table_mass.map_or(Excitation::Force, |_| Excitation::Base);
         let mut numbers = [0.0; 3];
         for (number, symbol) in numbers.iter_mut().zip(["M", "k", "c"]) {
             let place = Values::place(symbol);

@@ -309,7 +309,8 @@ pub(super) struct ShakerSection {
     cell_mass: Option<f64>,
     #[serde(default)]
     compensated_mass: f64,
-    table_mass: Option<f64>,
+    /// Of the table that it moves, which carries the structure.
+    pub(super) table_mass: Option<f64>,
     resistance: f64,
     #[serde(default)]
     inductance: f64,
@@ -334,11 +335,6 @@ fn one() -> f64 {
 }
 
 impl ShakerSection {
-    /// Whether it moves a table that carries the structure.
-    pub(super) fn has_table(&self) -> bool {
-        self.table_mass.is_some()
-    }
-
     /// The structure with the shaker attached.
     pub(super) fn attach(&self, structure: Structure) -> Result<Structure, String> {
         let end_mass = match (structure.excitation, self.cell_mass, self.table_mass) {
