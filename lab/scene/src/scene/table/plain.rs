@@ -7,17 +7,6 @@ use super::{Channel, Contents};
 use crate::scene::utf8;
 use vines_rig::unit;
 
-/// Delimiters and decimal marks. Of two that read a table equally well it is the first.
-const LAYOUTS: [(u8, char); 8] = [
-    (b',', '.'),
-    (b';', '.'),
-    (b';', ','),
-    (b'\t', '.'),
-    (b'\t', ','),
-    (b' ', '.'),
-    (b' ', ','),
-    (b'|', '.'),
-];
 /// Number of rows, at the end of the table, by which the layout is found.
 const JUDGED: usize = 200;
 
@@ -126,9 +115,14 @@ fn channels(heads: impl Iterator<Item = (String, String)>, rows: &[StringRecord]
     heads.enumerate().map(channel).collect()
 }
 
-/// The layout of which the largest share of the cells are numbers or empty, and of several the one with most columns. `None` without a number.
+/// Delimiter and decimal mark of which the largest share of the cells are numbers or empty, of several the ones with most columns, and of these the first.
+/// `None` without a number.
 fn layout(text: &str) -> Option<(u8, char)> {
-    let judged = LAYOUTS.map(|(delimiter, decimal)| {
+    let layouts = b",;\t |"
+        .iter()
+        .flat_map(|delimiter| ['.', ','].map(|decimal| (*delimiter, decimal)));
+    let layouts = layouts.filter(|(delimiter, decimal)| char::from(*delimiter) != *decimal);
+    let judged = layouts.map(|(delimiter, decimal)| {
         let rows = tail(text, delimiter);
         let width = rows.first().map_or(0, StringRecord::len);
         let cells: usize = rows.iter().map(StringRecord::len).sum();
@@ -139,7 +133,7 @@ fn layout(text: &str) -> Option<(u8, char)> {
         ((delimiter, decimal), (share, width), numbers)
     });
     let compare = |one: (f64, usize), other: (f64, usize)| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1));
-    let best = judged.into_iter().rev().max_by(|one, other| compare(one.1, other.1));
+    let best = judged.rev().max_by(|one, other| compare(one.1, other.1));
     best.filter(|(.., numbers)| *numbers > 0).map(|(layout, ..)| layout)
 }
 
