@@ -378,10 +378,7 @@ impl Scene {
 
     /// Reads a scene from `text`; `origin` names it in messages.
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
-        let (sections, table) = overrides::read(origin, text, overrides)?;
-        let scene = sections.resolve(origin, &table)?;
-        scene.check_controller()?;
-        Ok(scene)
+        Ok(overrides::read(origin, text, overrides)?.0)
     }
 }
 

@@ -97,15 +97,17 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
     Ok(table)
 }
 
-/// Reads `text` and merges the overrides into it; with the merged table. `origin` names the text in messages.
-pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(Sections, Table), SceneError> {
+/// Reads a scene from `text` with the overrides merged into it; with the merged table. `origin` names the text in messages.
+pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(Scene, Table), SceneError> {
     let syntax = |error: toml::de::Error| SceneError::text(origin, plain(&error.to_string()));
     // The file is checked on its own first, so that an error can name the line.
     toml::from_str::<Sections>(text).map_err(syntax)?;
     let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;
     let mut sections = Sections::deserialize(table.clone()).map_err(syntax)?;
     sections.states_sensor = states_sensor(text, &table, overrides);
-    Ok((sections, table))
+    let scene = sections.resolve(origin, &table)?;
+    scene.check_controller()?;
+    Ok((scene, table))
 }
 
 /// Whether a scene other than the default one, or an override, has `resonance.sensor`.
@@ -134,10 +136,7 @@ impl Family {
     /// Reads a scene from `text`, or the default scene without one; nothing varies yet.
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
-        let (sections, table) = read(origin, text, overrides)?;
-        let scene = sections.resolve(origin, &table)?;
-        scene.check_controller()?;
-        let states_sensor = scene.states_sensor;
+        let (Scene { states_sensor, .. }, table) = read(origin, text, overrides)?;
         Ok(Self {
             origin: origin.into(),
             table,
