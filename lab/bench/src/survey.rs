@@ -80,8 +80,7 @@ const COMPARED: usize = 9;
 
 /// Orbits of this backbone behind the scene's shaker, and under a pure sine; `None` without a shaker.
 fn behind_shaker(scene: &Scene, backbone: &[StructureBranch]) -> Option<Vec<BehindShaker>> {
-    let structure = scene.structure.as_ref()?;
-    let shaker = structure.shaker.as_ref()?;
+    let (structure, shaker) = scene.shaken()?;
     let alone = scene.orbits_of(&shaker.alone);
     let stretches = backbone.iter().flat_map(StructureBranch::stable).map(|(run, _)| run);
     let run = stretches.max_by_key(|run| run.len())?;
@@ -169,8 +168,8 @@ pub(crate) struct ExactOrbits {
 impl ExactOrbits {
     /// Those of the oscillator or the structure of a scene.
     pub(crate) fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
-        let structure = scene.structure.as_ref().zip(scene.structure_orbits());
-        let structure = structure.map(|(structure, orbits)| (orbits, structure.units()));
+        let structure = scene.structure.as_ref();
+        let structure = structure.map(|structure| (scene.orbits_of(structure), structure.units()));
         Self { numbers: *numbers, structure }
     }
 
@@ -225,12 +224,11 @@ pub fn detunings(scene: &Scene, numbers: &Dimensionless) -> Option<[f64; 2]> {
 /// A point is moved by the difference, in frequency and drive, between the exact orbits with its response at the scene's parameters: of the driven mode
 /// alone, and of all modes near the frequency of the point. Points where one of them does not exist are left out. Those of one mode without a shaker stay.
 pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<MeasuredPoint> {
-    let host = scene.structure.as_ref().zip(scene.structure_orbits());
-    let Some((structure, orbits)) =
-        host.filter(|(structure, _)| structure.modes.len() > 1 || structure.shaker.is_some())
-    else {
+    let is_more = |structure: &&Structure| structure.modes.len() > 1 || structure.shaker.is_some();
+    let Some(structure) = scene.structure.as_ref().filter(is_more) else {
         return points;
     };
+    let orbits = scene.orbits_of(structure);
     let moved = |mut point: MeasuredPoint| {
         let definition = scene.definition().at_phase(point.phase);
         let numbers = Dimensionless { definition, ..scene.dimensionless() };

@@ -138,6 +138,12 @@ impl Scene {
         self.structure.as_ref().map_or(Units::OSCILLATOR, Structure::units)
     }
 
+    /// Its structure, and the shaker that moves it.
+    pub fn shaken(&self) -> Option<(&Structure, &SceneShaker)> {
+        let structure = self.structure.as_ref()?;
+        Some((structure, structure.shaker.as_ref()?))
+    }
+
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
     pub fn dimensionless_start(&self) -> [f64; 4] {
         self.dimensionless().state(&self.start)
@@ -233,10 +239,7 @@ impl Scene {
     /// what the impacts on a particle of the speed b omega0, whose harmonics are 4/pi m b omega0², make of the force through structure and shaker, and
     /// through an anti-alias filter. `None` without a shaker or a drive.
     pub fn aliased(&self, times: f64) -> Option<f64> {
-        let (structure, shaker) = self
-            .structure
-            .as_ref()
-            .and_then(|one| Some((one, one.shaker.as_ref()?)))?;
+        let (structure, shaker) = self.shaken()?;
         if self.amplitude <= 0.0 {
             return None;
         }
@@ -250,12 +253,8 @@ impl Scene {
             .host
             .frequency_response_to_cavity(&reference, at * omega)
             .norm();
-        Some(
-            structure
-                .units()
-                .reference
-                .in_metres(force * impacts * at.powi(order) * passed),
-        )
+        let force = force * impacts * at.powi(order) * passed;
+        Some(structure.units().reference.in_metres(force))
     }
 
     /// The controller's sample time, s: rig and controller agree on it before anything is measured. It has 31 significant bits (2e-10 of it is

@@ -227,11 +227,7 @@ impl Scene {
     /// table through structure and shaker. A faster mode adds up successive impulses, less what it loses between them; slower changes the detector
     /// follows.
     fn in_reference(&self, knowledge: &Knowledge) -> f64 {
-        let Some((structure, shaker)) = self
-            .structure
-            .as_ref()
-            .and_then(|one| Some((one, one.shaker.as_ref()?)))
-        else {
+        let Some((structure, shaker)) = self.shaken() else {
             return 0.0;
         };
         let omega = knowledge.linear.omega0;

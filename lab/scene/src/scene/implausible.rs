@@ -56,8 +56,8 @@ impl Scene {
     /// command, over the natural frequency. What the amplifier's limit gives as a force, over the weight of the armature, whose sag, over the
     /// stroke, and the stroke, m: other units than SI are wrong by a factor of 1000.
     fn doubtful_shaker(&self) -> Option<[f64; 5]> {
-        let (structure, path) = (self.structure.as_ref()?, self.knowledge().shaker?);
-        let SceneShaker { shaker, limits, .. } = structure.shaker.as_ref()?;
+        let (structure, SceneShaker { shaker, limits, .. }) = self.shaken()?;
+        let path = self.knowledge().shaker?;
         let squares = |point: usize| {
             structure
                 .modes
