@@ -265,10 +265,9 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
     fn criterion(&self) -> Criterion {
         let before = |back: usize| self.script.levels.iter().nth_back(back).copied();
         Criterion {
-            knowledge: self.plan.knowledge,
-            precision: self.plan.precision,
             largest: self.plan.levels.iter().copied().fold(0.0, f64::max),
             before: [before(1), before(0)],
+            ..self.script.criterion()
         }
     }
 }

@@ -379,7 +379,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     }
 
     /// What is asked of a level on its own.
-    fn criterion(&self) -> Criterion {
+    pub fn criterion(&self) -> Criterion {
         Criterion {
             knowledge: *self.knowledge,
             precision: self.run.plan.precision,

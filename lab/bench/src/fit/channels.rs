@@ -81,8 +81,7 @@ impl Deref for File<'_> {
 impl File<'_> {
     /// Refuses a rate that is not above 0, and a delay that is not finite.
     fn checked(&self, selection: &Selection) -> Result<(), RecordingError> {
-        if selection.rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
-            let rate = selection.rate.unwrap_or_default();
+        if let Some(rate) = selection.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             return Err(self.refused(&format!(": the rate is {rate} samples a second; it must be above 0")));
         }
         if let Some(late) = selection.late.filter(|late| !late.is_finite()) {

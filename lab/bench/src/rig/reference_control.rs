@@ -13,6 +13,7 @@ use num_complex::Complex64;
 
 use super::{Drive, RigError};
 use vines_scene::knowledge::{Knowledge, Target};
+use vines_scene::linear::LinearResponse;
 use vines_scene::shaker_path::{BANDWIDTH, DETECTOR, OBSERVER, ODD_HARMONICS, SECOND, ShakerPath, rate_of};
 
 /// Largest difference between both, as a share of what the command makes of a structure that does not move: of the reference, this share over the
@@ -52,10 +53,8 @@ impl Detector {
 #[derive(Debug, Clone)]
 pub(crate) struct ReferenceControl {
     path: ShakerPath,
-    omega0: f64,
-    damping_rate: f64,
-    /// Response over `z`, 1/s.
-    gain: Complex64,
+    /// Its gain is the response over `z`, 1/s.
+    linear: LinearResponse,
     target: Target,
     /// Time by which the readings are late, s.
     delay: f64,
@@ -86,13 +85,11 @@ impl ReferenceControl {
     pub fn new(knowledge: &Knowledge, delay: f64) -> Option<Self> {
         Some(Self {
             path: knowledge.shaker?,
-            omega0: knowledge.linear.omega0,
-            damping_rate: knowledge.linear.damping_rate,
+            linear: knowledge.linear,
             target: knowledge.target,
             delay,
             phases: [0.0; 2],
             asked: 0.0,
-            gain: knowledge.linear.gain,
             error: Detector::default(),
             response: Detector::default(),
             impacts: Complex64::ZERO,
@@ -116,17 +113,19 @@ impl ReferenceControl {
         let error = (self.asked / displacement * Complex64::cis(phase)).im - reading;
         // A reading that is no number is the controller's to refuse.
         if error.is_finite() && response.is_finite() {
-            let rate = self.path.pole + Complex64::new(0.0, omega - self.omega0);
-            let driven = self.gain * self.path.gain * self.command / of_response;
+            let rate = self.path.pole + Complex64::new(0.0, omega - self.linear.omega0);
+            let driven = self.linear.gain * self.path.gain * self.command / of_response;
             self.response.phasors[0] += step * (driven + self.impacts - rate * self.response.phasors[0]);
             let predicted = self.response.phasors[0];
-            let share = |bandwidth: f64| 1.0 - (-bandwidth * self.path.speed * self.omega0 * step).exp();
+            let share = |bandwidth: f64| 1.0 - (-bandwidth * self.path.speed * self.linear.omega0 * step).exp();
             self.error.take(error, phase, omega * step, share(DETECTOR));
             self.response.take(response, phase, omega * step, share(OBSERVER));
-            self.impacts += SECOND * OBSERVER * self.path.speed * self.omega0 * (self.response.phasors[0] - predicted);
+            self.impacts +=
+                SECOND * OBSERVER * self.path.speed * self.linear.omega0 * (self.response.phasors[0] - predicted);
         }
         let error = self.error.phasors[0] * displacement;
-        let moved = (self.path.pole - self.damping_rate) / self.gain * self.response.phasors[0] * of_response;
+        let moved =
+            (self.path.pole - self.linear.damping_rate) / self.linear.gain * self.response.phasors[0] * of_response;
         let [expected, read] = [self.path.gain * self.command - moved, self.asked - error];
         let largest = self.asked * (LOST_SHARE / self.path.drop_out()).min(1.0);
         let is_driven = self.asked > 0.0 && amplitude > 0.0;
@@ -146,7 +145,7 @@ impl ReferenceControl {
         if amplitude == 0.0 {
             self.correction = Complex64::ZERO;
         } else if self.times <= 1.0 {
-            self.correction += BANDWIDTH * self.path.speed * self.omega0 * step * error;
+            self.correction += BANDWIDTH * self.path.speed * self.linear.omega0 * step * error;
         }
         let inverse = (amplitude + self.correction + moved) / self.path.gain;
         self.times = inverse.norm() / self.path.largest;
