@@ -437,13 +437,7 @@ impl File<'_> {
         let is_uneven = broken.is_some() || sorted[0] < 0.5 * step;
         let rounded = if is_uneven { rounded(times, step) } else { None };
         if let Some(n) = broken.filter(|_| rounded.is_none()) {
-            return Err(RecordingError::new(format!(
-                "{origin}, {}: the time goes from {} s to {} s, where a step is {step:.6e} s: the recording is interrupted there. Fit the parts \
-                 as files of their own, `vines fit one.csv two.csv`",
-                self.place(n + 1),
-                times[n],
-                times[n + 1]
-            )));
+            return Err(self.interrupted(times, n, step));
         }
         let step = rounded.unwrap_or(step);
         let [response, drive] = both;
@@ -485,6 +479,18 @@ impl File<'_> {
         Ok([clock.start, given])
     }
 
+    /// Refuses times that go on from the sample `n` by much more or less than a step, s.
+    fn interrupted(&self, times: &[f64], n: usize, step: f64) -> RecordingError {
+        RecordingError::new(format!(
+            "{}, {}: the time goes from {} s to {} s, where a step is {step:.6e} s: the recording is interrupted there. Fit the parts as files of their \
+             own, `vines fit one.csv two.csv`",
+            self.origin,
+            self.place(n + 1),
+            times[n],
+            times[n + 1]
+        ))
+    }
+
     /// Start and step of the clock where several samples have the same time, because its resolution is coarse: only a rate tells the step. `None`
     /// where the times determine it.
     fn coarse(
@@ -518,14 +524,7 @@ impl File<'_> {
             .iter()
             .find(|n| !(0.0..MISSING_STEP * resolution).contains(&steps[**n]))
         {
-            return Err(RecordingError::new(format!(
-                "{}, {}: the time goes from {} s to {} s, where a step is {resolution:.6} s: the recording is interrupted there. Fit the parts as files \
-                 of their own",
-                self.origin,
-                self.place(n + 1),
-                times[*n],
-                times[n + 1]
-            )));
+            return Err(self.interrupted(times, *n, resolution));
         }
         let what = match jumps.len() {
             0 => format!("all {} samples have the time {} s", count + 1, times[0]),
