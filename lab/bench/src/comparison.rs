@@ -276,11 +276,6 @@ impl ExactCurve {
         &self.places
     }
 
-    /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
-    pub fn at(&self, c: f64) -> Option<[f64; 2]> {
-        at(&self.places, c).map(|[_, sigma, g, _]| [sigma, g])
-    }
-
     /// Sigma and speed of the place on the polygon with the same C as `(C, sigma, G)`, the nearest of several.
     fn place(&self, c: f64, sigma: f64, g: f64) -> Option<[f64; 2]> {
         let pairs = || self.compared.iter().flat_map(|places| places.windows(2));
