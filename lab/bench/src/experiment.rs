@@ -558,19 +558,19 @@ fn guard(config: &Config, target: &Target, response: f64, drive: Drive) -> Resul
 /// A command with values that a rig and an identification can take; `reference`: the unit of its drive in messages.
 fn checked(command: Command, reference: Unit) -> Result<Command, ExperimentError> {
     let Drive { omega, amplitude, displacement } = command.drive;
-    let phase_error = command.phase_error.unwrap_or(0.0);
-    let refused = |name, value, allowed| Err(ExperimentError::Command { name, value, allowed });
-    let [frequency, phase_error] =
-        [(omega, "rad/s"), (phase_error, "rad")].map(|(value, unit)| Quantity { value, unit });
-    let [amplitude, displacement] = [amplitude, displacement].map(|metres| reference.quantity(metres));
-    for (name, quantity) in [("omega", frequency), (symbol_of(reference.symbol), amplitude)] {
-        if !(quantity.value.is_finite() && quantity.value >= 0.0) {
-            return refused(name, quantity, "a finite number, 0 or above");
-        }
-    }
-    for (name, quantity) in [("drive", displacement), ("phase_error", phase_error)] {
-        if !quantity.value.is_finite() {
-            return refused(name, quantity, "a finite number");
+    let angular = |value, unit| Quantity { value, unit };
+    for (name, value, is_signed) in [
+        ("omega", angular(omega, "rad/s"), false),
+        (symbol_of(reference.symbol), reference.quantity(amplitude), false),
+        ("drive", reference.quantity(displacement), true),
+        ("phase_error", angular(command.phase_error.unwrap_or(0.0), "rad"), true),
+    ] {
+        if !(value.value.is_finite() && (is_signed || value.value >= 0.0)) {
+            let allowed = match is_signed {
+                true => "a finite number",
+                false => "a finite number, 0 or above",
+            };
+            return Err(ExperimentError::Command { name, value, allowed });
         }
     }
     Ok(command)
