@@ -475,7 +475,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);
         let to = Move {
             response: level,
-            duration: periods * self.period(),
+            duration: periods * self.knowledge.numbers.natural_period(),
             amplitude,
             omega,
             growth: 0.0,
@@ -486,11 +486,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// Where the loop holds the rig: at the last level, or in the last leg.
     fn here(&self) -> Held {
         *self.levels.last().unwrap_or(&self.moving)
-    }
-
-    /// Natural period, s.
-    fn period(&self) -> f64 {
-        TAU / self.knowledge.linear.omega0
     }
 
     /// Periods for a change of the response to `level`, m, from where `drive`, m, holds it. The additional drive makes it grow by pi times as much per
@@ -536,10 +531,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
 
     /// Moves the setpoint by `change`, m, within `periods` and measures meanwhile. The setpoint ends, and goes on, with the growth `onward`, m per period.
     fn leg(&mut self, change: f64, periods: usize, onward: f64) -> Result<Leg, ExperimentError> {
+        let period = self.knowledge.numbers.natural_period();
         let to = Move {
             response: (self.setpoint + change).max(RESPONSES[1] * self.b),
-            duration: periods as f64 * self.period(),
-            growth: onward / self.period(),
+            duration: periods as f64 * period,
+            growth: onward / period,
             ..Move::default()
         };
         self.run.hold_response(to)?;

@@ -278,7 +278,7 @@ impl Scene {
     /// not coupled.
     pub(crate) fn tracking_config(&self, knowledge: &Knowledge) -> Config {
         let config = self.lock_config(knowledge);
-        let is_set = self.phase_lock.sets("amplitude_max");
+        let is_set = self.phase_lock.0.iter().any(|(given, _)| *given == "amplitude_max");
         let limit = config.amplitude_max.filter(|_| is_set);
         // Largest bandwidth of the loops of phase and amplitude, in units of omega0, at which their coupling is weak. A drive that changes shifts
         // the phase that the detectors read, and a frequency that changes shifts the amplitude. From loop to loop the gain is the cube of the
@@ -388,11 +388,6 @@ impl Serialize for PhaseLock {
 }
 
 impl PhaseLock {
-    /// Whether a value is given for a parameter.
-    fn sets(&self, name: &str) -> bool {
-        self.0.iter().any(|(given, _)| *given == name)
-    }
-
     /// The configuration with these values; drives and responses are in these units.
     fn apply(&self, [drive, response]: [Unit; 2], mut config: Config) -> Config {
         for (name, setting) in &self.0 {

@@ -527,12 +527,9 @@ impl StructureSection {
             .as_ref()
             .map(|file| Matrix::read(folder, "M", file))
             .transpose()?;
-        if mass.is_none() {
-            self.only_with("M", "direction", self.direction.is_some())?;
-        }
-        if let Some(mass) = &mass {
-            mass.symmetric()?;
-            mass.heavy()?;
+        match &mass {
+            None => self.only_with("M", "direction", self.direction.is_some())?,
+            Some(mass) => mass.symmetric().and_then(|()| mass.heavy())?,
         }
         let mut modes = Vec::new();
         for (n, mode) in self.modes.iter().enumerate() {
@@ -571,20 +568,18 @@ impl StructureSection {
             let shape: Vec<f64> = shape.values().copied().collect();
             let by_mass = mass.as_ref().map(|mass| self.by_mass(mass, number, &points, &shape));
             let by_mass = by_mass.transpose()?;
-            let drive = match (self.excitation, participation.or(by_mass)) {
+            let drive = match (self.excitation, participation) {
                 (Excitation::Force, None) => 0.0,
-                (Excitation::Base, Some(participation)) => participation,
-                (Excitation::Base, None) => {
-                    return Err(format!(
-                        "mode {number} has no participation of the base: give `participation` in sqrt(kg), or `M`, from which it follows"
-                    ));
-                }
-                (Excitation::Force, Some(_)) if participation.is_none() => 0.0,
                 (Excitation::Force, Some(_)) => {
                     return Err(format!(
                         "mode {number} has a participation, which belongs to excitation = \"base\": a force acts by the shape at its point"
                     ));
                 }
+                (Excitation::Base, given) => given.or(by_mass).ok_or_else(|| {
+                    format!(
+                        "mode {number} has no participation of the base: give `participation` in sqrt(kg), or `M`, from which it follows"
+                    )
+                })?,
             };
             modes.push(StructureMode {
                 omega: TAU * frequency,
