@@ -29,7 +29,6 @@ const DISAGREES: f64 = 0.01;
 
 impl ResonancePoint {
     /// The point, which was measured in these units, in metres of the oscillator.
-    #[must_use]
     pub fn measured(&self, units: &Units) -> MeasuredPoint {
         let estimate = |value, uncertainty| Estimate { value, uncertainty };
         let measured = MeasuredPoint {
@@ -43,7 +42,6 @@ impl ResonancePoint {
 }
 
 /// Decimals for two digits of a standard uncertainty.
-#[must_use]
 pub fn decimals(uncertainty: f64) -> usize {
     if uncertainty > 0.0 && uncertainty.is_finite() {
         (1.0 - uncertainty.log10().floor()).clamp(0.0, 15.0) as usize
@@ -171,7 +169,6 @@ pub struct LinearVerdict {
 
 impl LinearVerdict {
     /// Whether a state agrees with the data: the probability of a larger rise, of two degrees of freedom, is at least 1 %.
-    #[must_use]
     pub fn agrees(&self) -> [bool; 2] {
         let is_likely = |rise: f64| probability(rise, 2.0).is_some_and(|p| p >= DISAGREES);
         self.rises.map(|rise| rise.is_some_and(is_likely))
@@ -223,7 +220,6 @@ pub struct Contradiction {
 /// How the points contradict the rig `expected`. `None` where they do not, or cannot tell, or where the rig has effects of a real cavity. What is
 /// systematic in the uncertainties of points is alike from point to point. Where no parameter differs, it may be one error, whose square all of
 /// chi-square repeats.
-#[must_use]
 pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<Contradiction> {
     let scene = Some(expected).filter(|expected| expected.cavity == Cavity::IDEAL)?;
     let data = Data { points: points.to_vec(), definition, ..Data::default() };
@@ -332,19 +328,16 @@ fn parameters(expected: &Parameters, estimate: impl Fn(Quantity) -> Option<Estim
 
 impl Found {
     /// The plant of the best hypothesis.
-    #[must_use]
     pub fn plant(&self, scene: &Parameters) -> Parameters {
         self.hypotheses.best().plant(scene)
     }
 
     /// What contradicts the best hypothesis most.
-    #[must_use]
     pub fn worst(&self) -> String {
         self.data.worst(self.hypotheses.best())
     }
 
     /// The numbers of the fit, beside those of the rig that was expected.
-    #[must_use]
     pub fn report(&self, expected: &Parameters) -> FitReport {
         let (all, best) = (&self.hypotheses, self.hypotheses.best());
         let hypothesis = |fit: &Fit| {

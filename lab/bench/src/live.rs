@@ -27,7 +27,6 @@ impl LastImpacts {
     }
 
     /// Impacts per period of the drive.
-    #[must_use]
     pub fn per_period(&self) -> f64 {
         match (self.0.first(), self.0.last()) {
             (Some(first), Some(last)) if last.time > first.time => {
@@ -38,7 +37,6 @@ impl LastImpacts {
     }
 
     /// Their regime at the phase `now`, rad, as it is determined in an experiment.
-    #[must_use]
     pub fn regime(&self, now: f64) -> Regime {
         let since = self.0.last().map_or(now, |last| now - last.time);
         if since > QUIET * TAU {

@@ -86,19 +86,16 @@ impl Cells {
     }
 
     /// The scene without the values of the axes.
-    #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
     /// The detuning, unless it varies.
-    #[must_use]
     pub fn sigma(&self) -> Option<f64> {
         (!self.keys.iter().any(|key| key == SIGMA)).then_some(self.sigma)
     }
 
     /// Largest number of periods that a cell is followed.
-    #[must_use]
     pub fn periods(&self) -> usize {
         self.periods
     }

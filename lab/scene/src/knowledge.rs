@@ -68,7 +68,6 @@ impl Target {
     }
 
     /// Readings in the units of their channels as displacements in metres of the oscillator, as a loop with this target takes them.
-    #[must_use]
     pub fn scaled(&self, sensors: Sensors) -> Sensors {
         Sensors {
             response: self.in_metres(0, sensors.response),
@@ -77,7 +76,6 @@ impl Target {
     }
 
     /// Readings in the units of their channels, from [`Target::scaled`].
-    #[must_use]
     pub fn unscaled(&self, sensors: Sensors) -> Sensors {
         let reading = |channel, scaled| self.quantity(channel, scaled).value;
         Sensors {
@@ -87,13 +85,11 @@ impl Target {
     }
 
     /// A drive in metres of the oscillator, as the command of a rig.
-    #[must_use]
     pub fn command(&self, drive: Drive) -> Drive {
         drive.map(|metres| self.units.command.of_metres(metres))
     }
 
     /// The command of a rig, in metres of the oscillator.
-    #[must_use]
     pub fn drive(&self, command: Drive) -> Drive {
         command.map(|value| self.units.command.in_metres(value))
     }

@@ -73,7 +73,6 @@ impl MeasuredLinear {
     ];
 
     /// Natural frequency, Hz, and damping ratio.
-    #[must_use]
     pub fn estimates(&self) -> [Estimate; 2] {
         [(self.f0, self.u_f0), (self.zeta, self.u_zeta)].map(|(value, uncertainty)| Estimate { value, uncertainty })
     }
@@ -116,7 +115,6 @@ fn beyond(distance: f64, uncertainty: f64, [inner, outer]: [f64; 2]) -> Impacts 
 
 /// What a motion says of impacts by its frequency and its loss: response, m, base, m, and frequency, rad/s, at the phase `target` of the response
 /// relative to the base, rad. `epsilon`: the mass ratio in the drawing.
-#[must_use]
 pub fn impacts_by_resonance(
     linear: &LinearResponse,
     [response, base, omega]: [Estimate; 3],
@@ -154,7 +152,6 @@ pub fn impacts_by_resonance(
 }
 
 /// What the third harmonic of the structure's motion says of impacts: the force that excites it, over the force of the mass M in the fundamental.
-#[must_use]
 pub fn impacts_by_harmonic(third: Estimate, epsilon: f64) -> Impacts {
     // Of sliding friction it is at most that of a square wave as high as the force that carries the particle.
     let friction = 4.0 / (3.0 * PI) * LARGEST_RATIO * epsilon;

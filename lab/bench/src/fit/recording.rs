@@ -46,7 +46,6 @@ pub struct Recording {
 }
 
 /// What a linear decay says, in words.
-#[must_use]
 pub fn decay_in_words(decay: &MeasuredLinear) -> String {
     let [f0, zeta] = decay.estimates().map(|Estimate { value, uncertainty }| {
         let decimals = decimals(uncertainty);
@@ -62,7 +61,6 @@ pub struct RecordingError(String);
 
 impl RecordingError {
     /// With this message.
-    #[must_use]
     pub fn new(message: String) -> Self {
         Self(message)
     }

@@ -218,7 +218,6 @@ pub struct SensorsOnly(Box<dyn Rig>);
 
 impl SensorsOnly {
     /// Hides the ground truth of a rig.
-    #[must_use]
     pub fn around(rig: Box<dyn Rig>) -> Self {
         Self(rig)
     }

@@ -40,7 +40,6 @@ pub struct Contents {
 
 impl Contents {
     /// The unit that the file states for the channel of this name, empty without one; `None` without such a channel.
-    #[must_use]
     pub fn unit(&self, name: &str) -> Option<&str> {
         let channel = self.channels.iter().find(|one| one.name == name);
         channel.map(|channel| &*channel.unit)
@@ -63,7 +62,6 @@ impl Contents {
     }
 
     /// A refusal, with the channels as they were read.
-    #[must_use]
     pub fn refusal(&self, message: &str) -> String {
         let after = |sign: char, text: &str, end: char| match text {
             "" => String::new(),
