@@ -145,11 +145,8 @@ fn as_detected(scene: &Scene) -> Range {
 
 // Rules.
 
-/// Why a scene is refused, and what to do.
-type Rule = fn(&Scene) -> Option<String>;
-
-/// What joins keys of several sections.
-const RULES: [Rule; 8] = [
+/// What joins keys of several sections: why a scene is refused, and what to do.
+const RULES: [fn(&Scene) -> Option<String>; 8] = [
     mode_without_cavity,
     start_beyond_structure,
     second_reference,
