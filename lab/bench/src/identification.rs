@@ -132,7 +132,13 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
         let repeats = repeats.filter(|_| is_expected);
         return Err(IdentificationError::Regime { regime: lock.regime, repeats, sigma, c, silent });
     }
-    on_target(&lock, plan.lock.lock.phase_tolerance)?;
+    let (error, uncertainty) = (lock.at.phase_error_deg, lock.at.u_phase_deg);
+    let tolerance = plan.lock.lock.phase_tolerance.to_degrees();
+    // NaN is off the target, too.
+    let is_on_target = error.abs() <= tolerance + SIGNIFICANT * uncertainty;
+    if !is_on_target {
+        return Err(IdentificationError::OffTarget { error, uncertainty, tolerance });
+    }
     sensors_after_release(record, &knowledge)?;
     Ok(Identification {
         knowledge,
@@ -449,23 +455,13 @@ impl ResonancePoint {
     }
 }
 
-// What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
+// What makes a record useless: a sensor that fails after the release.
 
 /// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
 /// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
 const LEFT: f64 = 0.1;
 /// Steps of a converter below which the scatter of a response says nothing.
 const CONVERTER_STEPS: f64 = 8.0;
-
-/// Refuses a lock whose phase is farther from its target than the tolerance of the lock, rad.
-fn on_target(lock: &Lock, tolerance: f64) -> Result<(), IdentificationError> {
-    let tolerance = tolerance.to_degrees();
-    let error = lock.at.phase_error_deg;
-    if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
-        return Ok(());
-    }
-    Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })
-}
 
 /// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.
 fn sensors_after_release(record: &Record, knowledge: &Knowledge) -> Result<(), IdentificationError> {
