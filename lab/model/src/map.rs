@@ -393,8 +393,6 @@ fn regime(orbit: &Periodic) -> Regime {
 const STEPS_PER_PERIOD: usize = 64;
 /// Smallest number of periods over which it is averaged.
 const AVERAGED: usize = 64;
-/// Natural logarithm of the factor by which the distance to a periodic motion shrinks before the response is read: 1e-6.
-const SHRUNK: f64 = 14.0;
 /// Largest number of periods until the response is read.
 const WAITED: f64 = 2000.0;
 
@@ -414,8 +412,9 @@ impl CellRun {
     pub fn response(&mut self, result: &RegimeResult) -> Result<SteadyResponse, InvalidValue> {
         let repeats = result.periods > 0;
         if let Some(exponent) = result.exponent.filter(|exponent| repeats && *exponent < 0.0) {
-            // A motion that was stopped is read where it is.
-            let _ = self.follow(self.periods() + (-SHRUNK / exponent).min(WAITED) as usize + 1)?;
+            // The distance to the periodic motion shrinks by this factor. A motion that was stopped is read where it is.
+            let waited = (REPEAT_DIFFERENCE.ln() / exponent).min(WAITED);
+            let _ = self.follow(self.periods() + waited as usize + 1)?;
         }
         let unit = if repeats { result.periods as usize } else { 1 };
         let periods = unit * AVERAGED.div_ceil(unit);

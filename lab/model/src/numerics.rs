@@ -1,7 +1,6 @@
 //! Numerical methods that several modules share: roots and minima, statistics, linear and nonlinear least squares with uncertainties.
 
 use std::cell::RefCell;
-use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -59,10 +58,12 @@ pub trait Equations<const N: usize> {
     }
 }
 
-/// Size of the last correction of [`newton`] and, where rounding lets it fall no further, the largest. The unknowns are numbers of order one.
-pub const CONVERGED: f64 = 1e-12;
+/// Size of the last correction of an iteration, and width to which places on a curve are located; where rounding lets a correction fall no further,
+/// its largest size. The unknowns are numbers of order one.
+pub(crate) const CONVERGED: f64 = 1e-12;
 const CORRECTION_ROUNDING: f64 = 1e-10;
-/// Largest number of corrections, and of halvings of one that does not reduce the residuals.
+/// Largest number of corrections, of steps of the QR algorithm for an eigenvalue (as in LAPACK's dhseqr), and of halvings of a correction that does not
+/// reduce the residuals.
 const MOST_CORRECTIONS: usize = 30;
 const HALVINGS: usize = 6;
 
@@ -124,15 +125,12 @@ where
 #[must_use]
 pub fn eigenvalues(matrix: DMatrix<f64>) -> Vec<Complex<f64>> {
     let size = matrix.nrows();
-    let found = Schur::try_new(matrix, f64::EPSILON, QR_STEPS * size);
+    let found = Schur::try_new(matrix, f64::EPSILON, MOST_CORRECTIONS * size);
     found.map_or_else(
         || vec![Complex::new(f64::NAN, f64::NAN); size],
         |schur| schur.complex_eigenvalues().as_slice().to_vec(),
     )
 }
-
-/// Most steps of the QR algorithm for an eigenvalue, as in LAPACK's dhseqr; usual are two.
-const QR_STEPS: usize = 30;
 
 /// Pivots and singular values over the largest that are rounding.
 const SINGULAR: f64 = 1e-14;
@@ -160,17 +158,16 @@ pub fn secant(mut f: impl FnMut(f64) -> Option<f64>, [mut before, mut here]: [f6
 /// Neighbouring doubles between `a` and `b` at which `f` differs; the first keeps the value that `f` has at `a`.
 pub fn bisection(a: f64, b: f64, mut f: impl FnMut(f64) -> bool) -> (f64, f64) {
     let at_a = f(a);
-    let Ok(ends) = try_bisection(a, b, 0.0, |x| Ok::<_, Infallible>(f(x) == at_a));
-    ends
+    try_bisection(a, b, 0.0, |x| Some(f(x) == at_a)).unwrap_or((a, b))
 }
 
-/// Ends of an interval, at most `width` wide or of neighbouring doubles, at which `like_a` changes; it is true at `a`.
-pub fn try_bisection<E>(
+/// Ends of an interval, at most `width` wide or of neighbouring doubles, at which `like_a` changes; it is true at `a`. `None` where it has no value.
+pub fn try_bisection(
     mut a: f64,
     mut b: f64,
     width: f64,
-    mut like_a: impl FnMut(f64) -> Result<bool, E>,
-) -> Result<(f64, f64), E> {
+    mut like_a: impl FnMut(f64) -> Option<bool>,
+) -> Option<(f64, f64)> {
     while (b - a).abs() > width {
         iteration();
         let middle = a + (b - a) / 2.0;
@@ -183,7 +180,7 @@ pub fn try_bisection<E>(
             b = middle;
         }
     }
-    Ok((a, b))
+    Some((a, b))
 }
 
 /// Minimum of `f` between `a` and `b` by golden-section search; `f` has one minimum there.

@@ -255,7 +255,7 @@ fn first_impact(scene: &Dimensionless, sigma: f64, phase: f64, periods: f64) -> 
         plant.advance(still, phase / drive.omega).unwrap();
         plant.advance(drive, periods * TAU / drive.omega).unwrap().impacts > 0
     };
-    try_bisection(0.0, 60.0, 1e-9, |g| Ok::<_, ()>(!hits(g))).unwrap().1
+    try_bisection(0.0, 60.0, 1e-9, |g| Some(!hits(g))).unwrap().1
 }
 
 #[test]

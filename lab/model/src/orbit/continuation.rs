@@ -11,10 +11,10 @@ use nalgebra::{Matrix4, Matrix6};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 use super::impacts::{Bounce, ImpactPattern, ImpactSection};
-use super::periodic::{Periodic, wrapped};
+use super::periodic::{Periodic, SAME_MOTION, wrapped};
 use super::return_map::{Bifurcation, Condition, Stability, Unknowns};
 use crate::Dimensionless;
-use crate::numerics::try_bisection;
+use crate::numerics::{CONVERGED, try_bisection};
 
 /// Ranges, number of points and step of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -193,10 +193,6 @@ const SHORTEST_STEP: f64 = 1e-7;
 const STRAIGHT: f64 = 0.98;
 /// Part of the longest step with which a branch reaches the one that it joins: near there, the plane at the end of a step meets both.
 const APPROACH: f64 = 1.0 / 256.0;
-/// Fraction of a step to which the end of a branch or a bifurcation is located.
-const LOCATION_FRACTION: f64 = 1e-12;
-/// Difference in sigma of a bifurcation that is located twice.
-const SAME_SIGMA: f64 = 1e-9;
 /// Largest rounding error of a test function: in conservative motions, some of these functions are zero everywhere.
 const TEST_FUNCTION_ROUNDING: f64 = 1e-9;
 /// Largest distance of a multiplier from the circle where a crossing is located.
@@ -285,7 +281,7 @@ impl Curve<'_> {
                 let beyond = turned * (1.1 * apart.norm());
                 branch.special.extend(self.crossings(beyond, [next, start]));
             } else if let [first, .., last] = &branch.special[..]
-                && (first.motion.sigma - last.motion.sigma).abs() < SAME_SIGMA
+                && first.motion.distance(&last.motion) < SAME_MOTION
             {
                 // The last step passed the start, and what is beyond it was known.
                 branch.special.pop();
@@ -316,8 +312,8 @@ impl Curve<'_> {
     /// The last motion within a step before the one that the branch doubles.
     fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
         let at = self.beside(from, tangent * step);
-        let before = |part: f64| at(part).map(|end| !joins(from, &end)).ok_or(());
-        let (end, _) = try_bisection(0.0, 1.0, LOCATION_FRACTION, before).ok()?;
+        let before = |part: f64| at(part).map(|end| !joins(from, &end));
+        let (end, _) = try_bisection(0.0, 1.0, CONVERGED, before)?;
         at(end)
     }
 
@@ -329,8 +325,8 @@ impl Curve<'_> {
             if first * last >= 0.0 || first.abs().max(last.abs()) < TEST_FUNCTION_ROUNDING {
                 return None;
             }
-            let like_first = |part: f64| Ok(kind.test(&at(part).ok_or(())?.map.monodromy()) * first > 0.0);
-            let (_, beyond) = try_bisection::<()>(0.0, 1.0, LOCATION_FRACTION, like_first).ok()?;
+            let like_first = |part: f64| Some(kind.test(&at(part)?.map.monodromy()) * first > 0.0);
+            let (_, beyond) = try_bisection(0.0, 1.0, CONVERGED, like_first)?;
             let motion = at(beyond)?;
             // Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
             let imaginary = if kind == Bifurcation::NeimarkSacker {

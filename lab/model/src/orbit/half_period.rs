@@ -13,12 +13,10 @@ use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2, Vector2};
 
 use super::flight::Flight;
 use super::multipliers::{self, Impact};
+use super::periodic::ORBIT_ERROR;
 use super::return_map::Stability;
 use super::symmetric::{Particle, SymmetricMotion, alternating};
 use crate::numerics::eigenvalues;
-
-/// Largest difference of the flight from half a period, rad: a slow impact is that ill-defined in time.
-const HALF_PERIOD_ERROR: f64 = 1e-8;
 
 /// The map of half a period, and its multipliers.
 pub(super) struct HalfPeriod {
@@ -53,7 +51,7 @@ impl HalfPeriod {
             particle: [line[0], motion.speed],
         };
         let (elapsed, wall) = flight.contact([b, motion.after[1] - motion.speed], b, 1.0)?;
-        let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < HALF_PERIOD_ERROR;
+        let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < ORBIT_ERROR;
         is_half_a_period.then(|| Self {
             impact: impact(&parts, motion),
             flows: parts.iter().map(|part| part.0).zip(flows).collect(),

@@ -120,8 +120,10 @@ impl Periodic {
 
 /// Largest distance of a settling motion from itself one repetition later, over b and b omega0, from which Newton's method starts.
 pub(crate) const SETTLING_DISTANCE: f64 = 1e-2;
-/// Largest distance of an exact motion from itself one repetition later.
-const ORBIT_ERROR: f64 = 1e-8;
+/// Largest distance of an exact motion from itself one repetition later. A slow impact is that ill-defined in time.
+pub(super) const ORBIT_ERROR: f64 = 1e-8;
+/// Largest [distance](Periodic::distance) of two motions that are the same.
+pub(super) const SAME_MOTION: f64 = 1e-6;
 /// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.
 const MULTIPLES: usize = 3;
 /// Longest pattern in the search, impacts.

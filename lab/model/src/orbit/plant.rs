@@ -105,17 +105,12 @@ pub fn resonant_motion(
     }
     let detour =
         Ideal::of(parameters, definition, in_the_middle).map(|ideal| ideal.continued(parameters, definition, Some(c)));
-    match detour {
-        Some(Ok(again))
-            if motion
-                .as_ref()
-                .is_ok_and(|motion| motion.stability.growth() <= again.stability.growth()) =>
-        {
-            motion
-        }
-        Some(Ok(again)) => Ok(again),
-        _ => motion,
-    }
+    let growth = |motion: &Result<PlantMotion, NoMotion>| {
+        motion
+            .as_ref()
+            .map_or(f64::INFINITY, |motion| motion.stability.growth())
+    };
+    detour.filter(|again| growth(again) < growth(&motion)).unwrap_or(motion)
 }
 
 /// The motion near `guess` that satisfies both conditions, a mirrored one if `guess` is and the plant is symmetric; of `guess`, only this, state, drive
@@ -148,8 +143,6 @@ pub fn resonant_motion_under(
     ideal.continued(parameters, definition, None)
 }
 
-/// Rounding error of a multiplier that is 1.
-const NEUTRAL: f64 = 1e-9;
 /// Longest motion that is searched, periods of the base.
 const LONGEST_MOTION: u32 = 32;
 
@@ -173,7 +166,7 @@ pub fn settled_motion(
         if (here(&plant.state()) - at).amax() < SETTLING_DISTANCE {
             match PhaseSection::new(parameters, definition, periods)?.solve(0.0, at, conditions) {
                 // A particle that only slides may slide anywhere: one multiplier is 1.
-                Ok(Solution { motion, .. }) if motion.stability.growth() < 1.0 + NEUTRAL => return Ok(Some(motion)),
+                Ok(Solution { motion, .. }) if !motion.stability.is_unstable() => return Ok(Some(motion)),
                 Ok(_) | Err(NoMotion::NotConverged) => {}
                 Err(error) => return Err(error),
             }

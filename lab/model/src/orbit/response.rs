@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::continuation::{Branch, BranchBifurcation, ContinuationLimits, branch_off, continue_both_ways};
 use super::impacts::ImpactPattern;
-use super::periodic::{LONGEST_PATTERN, Periodic};
+use super::periodic::{LONGEST_PATTERN, Periodic, SAME_MOTION};
 use super::return_map::{Bifurcation, Condition};
 use super::study::{least_excitation, symmetric_orbits};
 use crate::Dimensionless;
@@ -39,8 +39,6 @@ pub const DOUBLINGS: usize = 3;
 
 /// Detunings at which symmetric motions are computed, over the range.
 const DETUNINGS_SEARCHED: usize = 1200;
-/// Largest difference of two motions that are the same.
-const SAME_MOTION: f64 = 1e-6;
 
 /// The exact frequency response at the scene's G over the range of sigma in `limits`: symmetric 1:1 motions, and what branches off them at
 /// `doublings` symmetry breakings and period doublings in a row.

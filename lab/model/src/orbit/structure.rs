@@ -334,17 +334,20 @@ impl StructureOrbits {
 
     /// All orbits at the frequency `omega`, rad/s, with a reference of the amplitude `reference`, at any phase: none or up to two.
     pub fn at(&self, omega: f64, reference: f64) -> Vec<StructureOrbit> {
-        self.both(
-            omega,
-            |motions| motions.driven(reference),
-            |motion| self.accept(motion, true),
-        )
+        let both = self.both(omega, |motions| motions.driven(reference));
+        both.iter()
+            .flatten()
+            .filter_map(|motion| self.accept(motion, true))
+            .collect()
     }
 
     /// All orbits at phase resonance at the frequency `omega`, rad/s, under any drive: none or up to two.
     pub fn at_phase_resonance(&self, omega: f64) -> Vec<StructureOrbit> {
-        let roots = SymmetricMotions::phase_resonant;
-        self.both(omega, roots, |motion| self.accept_resonant(motion, true))
+        let both = self.both(omega, SymmetricMotions::phase_resonant);
+        both.iter()
+            .flatten()
+            .filter_map(|motion| self.accept_resonant(motion, true))
+            .collect()
     }
 
     /// The orbit at phase resonance whose response has the amplitude `response`, near a frequency, rad/s, and a speed of the particle.
@@ -506,16 +509,10 @@ impl StructureOrbits {
         SymmetricMotions::new(&self.sections, self.particle, &reading, omega)
     }
 
-    /// Both orbits of a quadratic at one frequency.
-    fn both(
-        &self,
-        omega: f64,
-        roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>,
-        accept: impl Fn(&SymmetricMotion) -> Option<StructureOrbit>,
-    ) -> Vec<StructureOrbit> {
-        let motions = self.motions(omega);
-        let both = motions.and_then(|motions| Some(roots(&motions)?.map(|speed| motions.at(speed))));
-        both.iter().flatten().filter_map(accept).collect()
+    /// Both motions of a quadratic at one frequency.
+    fn both(&self, omega: f64, roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>) -> Option<[SymmetricMotion; 2]> {
+        let motions = self.motions(omega)?;
+        Some(roots(&motions)?.map(|speed| motions.at(speed)))
     }
 
     /// The orbit as [`Self::accept`], if the phase of its response has the sign that is wanted.
@@ -584,11 +581,6 @@ impl StructureOrbits {
         })
     }
 
-    fn shares_of(&self, orbit: &StructureOrbit, [re, im]: [f64; 2]) -> Option<Vec<f64>> {
-        let motion = self.motions(orbit.omega)?.at(orbit.speed);
-        HalfPeriod::new(&self.sections, &self.particle, &motion)?.shares(Complex::new(re, im), orbit.omega)
-    }
-
     /// The curves of the two roots over frequency that are orbits.
     fn branches(
         &self,
@@ -596,10 +588,7 @@ impl StructureOrbits {
         roots: impl Fn(&SymmetricMotions) -> Option<[f64; 2]>,
         accept: impl Fn(&SymmetricMotion, bool) -> Option<StructureOrbit>,
     ) -> Vec<StructureBranch> {
-        let both = |omega: f64| {
-            let motions = self.motions(omega)?;
-            Some(roots(&motions)?.map(|speed| motions.at(speed)))
-        };
+        let both = |omega: f64| self.both(omega, &roots);
         let mut branches = Vec::new();
         for Interval { points, inside: turns } in intervals(self.grid(range.omega), |omega| both(omega).map(|_| ())) {
             let [low, high] = [points[0].0, points[points.len() - 1].0];
@@ -613,8 +602,7 @@ impl StructureOrbits {
                     .flatten()
             };
             let arcs = match turns {
-                [true, true] => vec![[0.0, TAU]],
-                [false, true] => vec![[0.0, TAU]],
+                [_, true] => vec![[0.0, TAU]],
                 [true, false] => vec![[PI, 3.0 * PI]],
                 [false, false] => vec![[0.0, PI], [PI, TAU]],
             };
@@ -689,8 +677,8 @@ impl StructureOrbits {
             return None;
         }
         let at = |angle: f64| at(angle, true);
-        let like_first = |angle: f64| at(angle).map(|orbit| orbit.stability.outside() == outside).ok_or(());
-        let (before, beyond) = try_bisection(from, to, LOCATION_WIDTH, like_first).ok()?;
+        let like_first = |angle: f64| Some(at(angle)?.stability.outside() == outside);
+        let (before, beyond) = try_bisection(from, to, LOCATION_WIDTH, like_first)?;
         // The multipliers rise in modulus: the first one outside has just left, or is about to enter.
         let orbit = at(if outside < second.stability.outside() {
             beyond
@@ -698,13 +686,15 @@ impl StructureOrbits {
             before
         })?;
         let multipliers = &orbit.stability.multipliers;
-        let multiplier = *multipliers.get(multipliers.len() - orbit.stability.outside())?;
-        let kind = match multiplier {
-            [_, im] if im != 0.0 => Bifurcation::NeimarkSacker,
-            [re, _] if re > 0.0 => Bifurcation::Fold,
-            _ => Bifurcation::SymmetryBreaking,
+        let [re, im] = *multipliers.get(multipliers.len() - orbit.stability.outside())?;
+        let kind = match im == 0.0 {
+            false => Bifurcation::NeimarkSacker,
+            true if re > 0.0 => Bifurcation::Fold,
+            true => Bifurcation::SymmetryBreaking,
         };
-        let shares = self.shares_of(&orbit, multiplier)?;
+        let motion = self.motions(orbit.omega)?.at(orbit.speed);
+        let half = HalfPeriod::new(&self.sections, &self.particle, &motion)?;
+        let shares = half.shares(Complex::new(re, im), orbit.omega)?;
         Some(StabilityChange { kind, orbit, shares, after: 0 })
     }
 }
@@ -750,7 +740,6 @@ fn since_impact(motion: &SymmetricMotion) -> (f64, f64) {
 
 /// The last orbit from `from`, where there is one, towards `to`, where there is none.
 fn end(at: &impl Fn(f64, bool) -> Option<StructureOrbit>, from: f64, to: f64) -> Option<StructureOrbit> {
-    let is_orbit = |angle: f64| Ok::<_, ()>(at(angle, false).is_some());
-    let (last, _) = try_bisection(from, to, LOCATION_WIDTH, is_orbit).ok()?;
+    let (last, _) = try_bisection(from, to, LOCATION_WIDTH, |angle| Some(at(angle, false).is_some()))?;
     (last != from).then(|| at(last, true)).flatten()
 }

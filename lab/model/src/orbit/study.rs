@@ -16,11 +16,9 @@ fn bare(scene: &Dimensionless) -> Dimensionless {
 }
 
 /// Dimensionless orbits of the host in the numbers of `scene`.
-fn told(scene: &Dimensionless, found: &[StructureOrbit]) -> Vec<Orbit> {
-    found
-        .iter()
-        .map(|orbit| orbit.in_numbers(&bare(scene), 1.0, 1.0))
-        .collect()
+fn told<'a>(scene: &Dimensionless, found: impl IntoIterator<Item = &'a StructureOrbit>) -> Vec<Orbit> {
+    let orbit = |orbit: &StructureOrbit| orbit.in_numbers(&bare(scene), 1.0, 1.0);
+    found.into_iter().map(orbit).collect()
 }
 
 /// All exact symmetric 1:1 orbits at resonance at the scene's G, by rising C; empty where there are none.
@@ -64,12 +62,7 @@ pub fn stable_backbone(scene: &Dimensionless, sigma: [f64; 2], points: usize) ->
     let range = StructureRange::at_any_speed(&bare(scene), sigma, points);
     let branches = StructureOrbits::of(scene).backbone(&range);
     let stretches = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
-    stretches
-        .map(|orbits| {
-            let orbits = orbits.into_iter();
-            orbits.map(|orbit| orbit.in_numbers(&bare(scene), 1.0, 1.0)).collect()
-        })
-        .collect()
+    stretches.map(|orbits| told(scene, orbits)).collect()
 }
 
 /// The orbit at phase resonance whose response has the amplitude `c` over b, near a detuning and a speed of the particle over `b omega0`.
