@@ -189,20 +189,14 @@ impl Definition {
 impl Sensor {
     /// As in a table.
     pub fn name(&self) -> &'static str {
-        match self {
-            Sensor::V => "v",
-            Sensor::Q1 => "q1",
-        }
+        ["v", "q1"][*self as usize]
     }
 }
 
 impl Reference {
     /// As in a table.
     pub fn name(&self) -> &'static str {
-        match self {
-            Reference::Base => "e",
-            Reference::Force => "the force",
-        }
+        ["e", "the force"][*self as usize]
     }
 
     /// Amplitude of the reference, a force as its static displacement, over that of the base that makes it at omega0; `damping`: 2 zeta.

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::slow_flow::{B_SYMMETRY_BREAKING, SlowFlow, impacts_stable};
+use super::slow_flow::{B_SYMMETRY_BREAKING, Equilibrium, SlowFlow};
 use crate::numerics::{bisection, equally_spaced, golden_section};
 use crate::oscillator::section;
 
@@ -31,34 +31,22 @@ pub struct Activation {
 const SPEEDS_SEARCHED: u32 = 600;
 
 impl SlowFlow {
-    /// Base amplitude that holds the particle speed `b` at the detuning `sigma`: `sqrt(loss^2 + spring^2)/C`.
-    pub fn excitation_at(&self, sigma: f64, b: f64) -> f64 {
-        self.loss(b).hypot(self.spring(sigma, b)) / self.manifold.c(b)
-    }
-
-    /// The motion at `sigma` and `b` is stable in both senses under the excitation that holds it.
-    pub fn stable_at(&self, sigma: f64, b: f64) -> bool {
-        let gamma = (-self.loss(b)).atan2(self.spring(sigma, b));
-        let g = self.excitation_at(sigma, b);
-        impacts_stable(&self.manifold, b) && self.equilibrium((g, sigma), b, gamma).slow_flow_stable
-    }
-
     /// A stable 1:1 motion exists at the excitation `g` and the detuning `sigma`.
     pub fn has_stable_motion(&self, g: f64, sigma: f64) -> bool {
-        self.equilibria(g, sigma)
-            .iter()
-            .any(|equilibrium| equilibrium.impacts_stable && equilibrium.slow_flow_stable)
+        self.equilibria(g, sigma).iter().any(Equilibrium::is_stable)
     }
 
     /// The activation thresholds at the detuning `sigma`; the mass ratio `epsilon` matters only for those from rest.
     pub fn activation(&self, epsilon: f64, sigma: f64) -> Activation {
         let [from_rest, from_rest_any_phase] = impacts_from_rest(epsilon, self.lambda, sigma);
-        let g = |b: f64| self.excitation_at(sigma, b);
+        // What holds the particle speed B.
+        let g = |b: f64| self.loss(b).hypot(self.spring(sigma, b)) / self.manifold.c(b);
+        let is_stable = |b: f64| self.equilibrium((g(b), sigma), b).is_stable();
         // Every B that a smallest G may need: the loss alone makes G grow with B far beyond the fold.
         let highest = 2.0 * B_SYMMETRY_BREAKING;
         let all = smallest((0.0, highest), |_| true, g).unwrap_or(f64::NAN);
         let range = (self.manifold.b_min(), B_SYMMETRY_BREAKING);
-        let stable = smallest(range, |b| self.stable_at(sigma, b), g);
+        let stable = smallest(range, is_stable, g);
         Activation {
             steady_linear: self.lambda.hypot(2.0 * sigma),
             from_rest,
@@ -93,8 +81,6 @@ fn smallest((low, high): (f64, f64), wanted: impl Fn(f64) -> bool, f: impl Fn(f6
 
 /// Points per period at which the largest displacement is looked for.
 const POINTS_PER_PERIOD: f64 = 32.0;
-/// Cosine of half the phase between two points, rounded down.
-const ROUNDED: f64 = 0.99;
 /// Beats that are searched; the first is the largest but for the phase of the fast motion in it.
 const BEATS: f64 = 3.0;
 /// Decay times after which the start is forgotten, and most periods of the search.
@@ -126,8 +112,8 @@ fn impacts_from_rest(epsilon: f64, lambda: f64, sigma: f64) -> [f64; 2] {
         let times = equally_spaced(0.0, end, (end / step) as usize + 2);
         let sizes: Vec<(f64, f64)> = times.map(|t| (t, size(t))).collect();
         let most = sizes.iter().fold(0.0, |most: f64, size| most.max(size.1));
-        // Between two points a sine of that height grows by no more than this.
-        let near = sizes.iter().filter(|size| size.1 > ROUNDED * most);
+        // Between two points a sine of that height grows by less than from one to the next.
+        let near = sizes.iter().filter(|size| size.1 > step.cos() * most);
         let peaks = near.map(|(t, _)| size(golden_section((t - step).max(0.0), t + step, |t| -size(t))));
         peaks.fold(steady.norm(), f64::max)
     };

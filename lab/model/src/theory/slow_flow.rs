@@ -174,19 +174,20 @@ pub struct Equilibrium {
     pub slow_flow_stable: bool,
 }
 
+impl Equilibrium {
+    /// Stable in both senses.
+    pub fn is_stable(&self) -> bool {
+        self.impacts_stable && self.slow_flow_stable
+    }
+}
+
 impl SlowFlow {
     /// All equilibria at the excitation `g` and the detuning `sigma`, on both branches, by rising B.
     ///
     /// The squares of the two equilibrium conditions (eq. 12) add up to a quartic in B (eq. 14).
     pub fn equilibria(&self, g: f64, sigma: f64) -> Vec<Equilibrium> {
-        self.equilibrium_speeds(g, Some(sigma))
-            .into_iter()
-            .map(|b| {
-                let sine = -self.loss(b);
-                let cosine = self.spring(sigma, b);
-                self.equilibrium((g, sigma), b, sine.atan2(cosine))
-            })
-            .collect()
+        let speeds = self.equilibrium_speeds(g, Some(sigma)).into_iter();
+        speeds.map(|b| self.equilibrium((g, sigma), b)).collect()
     }
 
     /// `G C cos gamma = (4/pi) B (1 - pi B/2) - 2 sigma C^2` at an equilibrium.
@@ -194,7 +195,9 @@ impl SlowFlow {
         2.0 * (self.free_detuning(b) - sigma) * self.manifold.c(b).powi(2)
     }
 
-    pub(super) fn equilibrium(&self, (g, sigma): (f64, f64), b: f64, gamma: f64) -> Equilibrium {
+    /// The equilibrium of the particle speed `b`, which `g` holds at the detuning `sigma`.
+    pub(super) fn equilibrium(&self, (g, sigma): (f64, f64), b: f64) -> Equilibrium {
+        let gamma = (-self.loss(b)).atan2(self.spring(sigma, b));
         Equilibrium {
             sigma,
             c: self.manifold.c(b),
@@ -321,21 +324,11 @@ impl SlowFlow {
 }
 
 impl SlowFlow {
-    /// The detunings at which the excitation `g` holds the particle speed `b`, and the phase of v there, rad:
-    /// `sigma = sigma_R ± sqrt(G^2 C^2 - loss^2)/(2 C^2)` (docs/theory.md, eq. 15); None if `g` is too small.
-    pub fn detunings(&self, g: f64, b: f64) -> Option<[(f64, f64); 2]> {
-        let c = self.manifold.c(b);
-        let loss = self.loss(b);
-        let square = (g * c - loss) * (g * c + loss);
-        (square >= 0.0).then(|| {
-            let spring = square.sqrt();
-            let shift = spring / (2.0 * c * c);
-            let free = self.free_detuning(b);
-            [
-                (free - shift, (-loss).atan2(spring)),
-                (free + shift, (-loss).atan2(-spring)),
-            ]
-        })
+    /// The distance from `sigma_R` of the detunings at which the excitation `g` holds the particle speed `b`: `sqrt(G^2 C^2 - loss^2)/(2 C^2)`
+    /// (docs/theory.md, eq. 15). At the ends, which are phase-resonant, rounding may make the square negative.
+    fn detuning_shift(&self, g: f64, b: f64) -> f64 {
+        let (c, loss) = (self.manifold.c(b), self.loss(b));
+        ((g * c - loss) * (g * c + loss)).max(0.0).sqrt() / (2.0 * c * c)
     }
 
     /// The frequency responses at the excitation `g`: closed curves over all B > 0, each of `points` points from its
@@ -353,20 +346,14 @@ impl SlowFlow {
 
     /// The loop of a response between the two speeds at which it turns.
     fn loop_between(&self, g: f64, [low, high]: [f64; 2], points: usize) -> Vec<Equilibrium> {
-        let steps = points.saturating_sub(1).max(1) as f64;
-        (0..points)
-            .filter_map(|n| {
-                let turn = TAU * n as f64 / steps;
-                let b = low + (high - low) * 0.5 * (1.0 - turn.cos());
-                let b = b.clamp(low, high).max(1e-9);
-                // Rounding may make the square root imaginary at the ends, which are phase-resonant.
-                let [left, right] = self
-                    .detunings(g, b)
-                    .unwrap_or_else(|| [(self.free_detuning(b), -PI / 2.0); 2]);
-                let (sigma, gamma) = if turn < PI { left } else { right };
-                sigma.is_finite().then(|| self.equilibrium((g, sigma), b, gamma))
-            })
-            .collect()
+        let at = |turn: f64| {
+            let b = low + (high - low) * 0.5 * (1.0 - turn.cos());
+            let b = b.clamp(low, high).max(1e-9);
+            let side = if turn < PI { -1.0 } else { 1.0 };
+            let sigma = self.free_detuning(b) + side * self.detuning_shift(g, b);
+            sigma.is_finite().then(|| self.equilibrium((g, sigma), b))
+        };
+        equally_spaced(0.0, TAU, points).filter_map(at).collect()
     }
 }
 
