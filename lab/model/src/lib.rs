@@ -6,6 +6,29 @@
 
 #![forbid(unsafe_code)]
 
+/// An enum, each of whose variants has a word in tables and files.
+macro_rules! words {
+    ($(#[$of_type:meta])* $type:ident::$word:ident { $($(#[$of_variant:meta])* $variant:ident = $text:literal,)+ }) => {
+        $(#[$of_type])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+        pub enum $type {
+            $($(#[$of_variant])* #[serde(rename = $text)] $variant,)+
+        }
+
+        impl $type {
+            /// All of them.
+            pub const ALL: [Self; [$($text),+].len()] = [$(Self::$variant),+];
+
+            /// As in a table and in a file.
+            pub fn $word(&self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)+
+                }
+            }
+        }
+    };
+}
+
 pub mod curves;
 mod definition;
 mod dimensionless;

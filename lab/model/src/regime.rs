@@ -3,69 +3,42 @@
 use std::f64::consts::PI;
 use std::fmt::{self, Display, Formatter};
 
-use serde::{Serialize, Serializer};
+use serde::Serializer;
 
 use crate::numerics::{mean, standard_deviation};
 
-/// Regime of a response.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub enum Regime {
-    /// The particle hits nothing: the linear mode.
-    #[serde(rename = "no impacts")]
-    NoImpacts,
-    /// Two impacts per period, on alternating walls, half a period apart.
-    #[serde(rename = "symmetric 1:1")]
-    Symmetric,
-    /// Two impacts per period, on alternating walls, at uneven intervals.
-    #[serde(rename = "asymmetric 1:1")]
-    Asymmetric,
-    /// Another pattern that repeats.
-    #[serde(rename = "n impacts")]
-    Several,
-    /// Nothing repeats, and disturbances neither grow nor shrink: the largest Lyapunov exponent is zero within its uncertainty.
-    #[serde(rename = "quasi-periodic")]
-    QuasiPeriodic,
-    /// The largest Lyapunov exponent is positive, and at least a fifth of the impacts belong to captures into 1:1 resonance, which
-    /// are lost again: a chaotic strongly modulated response.
-    #[serde(rename = "modulated")]
-    Modulated,
-    /// The largest Lyapunov exponent is positive, and fewer impacts belong to captures.
-    #[serde(rename = "chaotic")]
-    Chaotic,
-    /// None of these was shown within the periods that were simulated.
-    #[serde(rename = "undecided")]
-    Undecided,
-    /// Not 1:1; a record too short, or without impact data, cannot say more.
-    #[serde(rename = "other")]
-    Other,
-    /// Steady and off the linear mode; no harmonic shows whether it is symmetric.
-    #[serde(rename = "steady, symmetry unresolved")]
-    Unresolved,
-    /// The response alone shows neither impacts nor the linear mode.
-    #[serde(rename = "not established")]
-    NotEstablished,
-    /// No data to determine it from.
-    #[serde(rename = "unknown")]
-    Unknown,
+words! {
+    /// Regime of a response.
+    Regime::word {
+        /// The particle hits nothing: the linear mode.
+        NoImpacts = "no impacts",
+        /// Two impacts per period, on alternating walls, half a period apart.
+        Symmetric = "symmetric 1:1",
+        /// Two impacts per period, on alternating walls, at uneven intervals.
+        Asymmetric = "asymmetric 1:1",
+        /// Another pattern that repeats.
+        Several = "n impacts",
+        /// Nothing repeats, and disturbances neither grow nor shrink: the largest Lyapunov exponent is zero within its uncertainty.
+        QuasiPeriodic = "quasi-periodic",
+        /// The largest Lyapunov exponent is positive, and at least a fifth of the impacts belong to captures into 1:1 resonance, which
+        /// are lost again: a chaotic strongly modulated response.
+        Modulated = "modulated",
+        /// The largest Lyapunov exponent is positive, and fewer impacts belong to captures.
+        Chaotic = "chaotic",
+        /// None of these was shown within the periods that were simulated.
+        Undecided = "undecided",
+        /// Not 1:1; a record too short, or without impact data, cannot say more.
+        Other = "other",
+        /// Steady and off the linear mode; no harmonic shows whether it is symmetric.
+        Unresolved = "steady, symmetry unresolved",
+        /// The response alone shows neither impacts nor the linear mode.
+        NotEstablished = "not established",
+        /// No data to determine it from.
+        Unknown = "unknown",
+    }
 }
 
 impl Regime {
-    /// All of them.
-    pub const ALL: [Regime; 12] = [
-        Regime::NoImpacts,
-        Regime::Symmetric,
-        Regime::Asymmetric,
-        Regime::Several,
-        Regime::QuasiPeriodic,
-        Regime::Modulated,
-        Regime::Chaotic,
-        Regime::Undecided,
-        Regime::Other,
-        Regime::Unresolved,
-        Regime::NotEstablished,
-        Regime::Unknown,
-    ];
-
     /// Those of the map, the first ones; they exclude each other.
     pub const SIMULATED: [Regime; 8] = match Self::ALL.first_chunk() {
         Some(simulated) => *simulated,
@@ -93,18 +66,11 @@ impl Regime {
     /// Its short name, as in a table.
     pub fn name(&self) -> &'static str {
         match self {
-            Regime::NoImpacts => "no impacts",
-            Regime::Symmetric => "symmetric 1:1",
-            Regime::Asymmetric => "asymmetric 1:1",
-            Regime::Several => "n impacts",
-            Regime::QuasiPeriodic => "quasi-periodic",
-            Regime::Modulated => "modulated",
-            Regime::Chaotic => "chaotic",
-            Regime::Undecided => "undecided",
             Regime::Other => "irregular",
             Regime::Unresolved => "steady and nonlinear (symmetry unresolved)",
             Regime::NotEstablished => "not established (no evidence of impacts)",
             Regime::Unknown => "unknown (the rig does not report impacts)",
+            other => other.word(),
         }
     }
 }

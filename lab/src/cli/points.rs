@@ -310,11 +310,11 @@ fn is_symmetric(path: &Path, number: usize, row: &Row) -> Result<bool, ArgumentE
     }
     for (key, value) in MOTIONS.into_iter().filter_map(|key| Some((key, row.get(key)?))) {
         let word = |regime: &Regime| match key {
-            "motion" => regime.motion().into(),
-            _ => serde_json::to_value(regime).map_or_else(|_| String::new(), |word| text(&word)),
+            "motion" => regime.motion(),
+            _ => regime.word(),
         };
         let Some(regime) = Regime::ALL.iter().find(|regime| word(regime) == value.trim()) else {
-            let mut all: Vec<String> = Regime::ALL.iter().map(word).collect();
+            let mut all: Vec<&str> = Regime::ALL.iter().map(word).collect();
             all.dedup();
             return refused(key, value, &all.join("; "));
         };

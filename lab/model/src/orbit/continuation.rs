@@ -41,23 +41,24 @@ impl Default for ContinuationLimits {
     }
 }
 
-/// Why a branch ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BranchEnd {
-    /// It left the range of sigma or G.
-    Range,
-    /// It came back to its start.
-    Closed,
-    /// The largest number of points was reached.
-    Points,
-    /// Its motions, which are not 1:1, are unstable for a hundred points from there on: such a branch winds on within chaos.
-    Unstable,
-    /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
-    Joins,
-    /// The complex pair of multipliers on the unit circle becomes real.
-    Resonance,
-    /// The pattern of impacts ends here: a graze, or impacts that accumulate.
-    Graze,
+words! {
+    /// Why a branch ended.
+    BranchEnd::name {
+        /// It left the range of sigma or G.
+        Range = "left the range",
+        /// It came back to its start.
+        Closed = "closed",
+        /// The largest number of points was reached.
+        Points = "number of points",
+        /// Its motions, which are not 1:1, are unstable for a hundred points from there on: such a branch winds on within chaos.
+        Unstable = "unstable from there on",
+        /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
+        Joins = "joins a shorter pattern",
+        /// The complex pair of multipliers on the unit circle becomes real.
+        Resonance = "strong resonance",
+        /// The pattern of impacts ends here: a graze, or impacts that accumulate.
+        Graze = "graze",
+    }
 }
 
 /// A point where stability changes.
@@ -157,27 +158,6 @@ fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
     let [chord, beside] = [to, motion].map(|end| end.invariants() - from.invariants());
     let part = (beside.dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
     (beside - chord * part).norm()
-}
-
-impl BranchEnd {
-    /// As in a table.
-    pub fn name(&self) -> &'static str {
-        match self {
-            BranchEnd::Range => "left the range",
-            BranchEnd::Closed => "closed",
-            BranchEnd::Points => "number of points",
-            BranchEnd::Unstable => "unstable from there on",
-            BranchEnd::Joins => "joins a shorter pattern",
-            BranchEnd::Resonance => "strong resonance",
-            BranchEnd::Graze => "graze",
-        }
-    }
-}
-
-impl Serialize for BranchEnd {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
 }
 
 impl ContinuationLimits {

@@ -149,37 +149,24 @@ pub enum Condition {
     },
 }
 
-/// How stability changes at a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Bifurcation {
-    /// A multiplier passes +1: the frequency response turns back.
-    #[serde(rename = "fold")]
-    Fold,
-    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
-    #[serde(rename = "symmetry breaking")]
-    SymmetryBreaking,
-    /// A multiplier of the whole period passes -1.
-    #[serde(rename = "period doubling")]
-    PeriodDoubling,
-    /// A complex pair leaves the unit circle: modulation begins where the motion was stable.
-    #[serde(rename = "Neimark-Sacker")]
-    NeimarkSacker,
+words! {
+    /// How stability changes at a point.
+    Bifurcation::name {
+        /// A multiplier passes +1: the frequency response turns back.
+        Fold = "fold",
+        /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
+        SymmetryBreaking = "symmetry breaking",
+        /// A multiplier of the whole period passes -1.
+        PeriodDoubling = "period doubling",
+        /// A complex pair leaves the unit circle: modulation begins where the motion was stable.
+        NeimarkSacker = "Neimark-Sacker",
+    }
 }
 
 /// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
 const MAP_DIFFERENCE: f64 = 1e-6;
 
 impl Bifurcation {
-    /// As in a table.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::NeimarkSacker => "Neimark-Sacker",
-        }
-    }
-
     /// Zero where the multipliers of a map are on the unit circle as the bifurcation says, and smooth also where multipliers meet.
     pub(super) fn test(self, map: &Matrix4<f64>) -> f64 {
         match self {
