@@ -13,24 +13,16 @@ use vines::orbit::{
     Stability, backbone, continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion,
     stable_resonant,
 };
-use vines::report::responses;
+use vines::report::{CURVE_POINTS, responses};
+use vines::scene::{Dimensionless, Scene};
 use vines::survey::{DETUNINGS, detunings, structure_curves};
-use vines::{
-    ArgumentError,
-    numerics::range,
-    scene::{Dimensionless, Scene},
-};
-use vines::{
-    cells,
-    table::{Table, lines, note, number},
-};
+use vines::table::{Table, lines, note, number};
+use vines::{ArgumentError, cells, numerics::range};
 
+use super::failure::Failure;
+use super::options::{SceneArguments, positive_frequency, warn_left_out};
 use super::output::{Results, output, stability, writable};
 use super::summary::{self, parameters};
-use super::{
-    failure::Failure,
-    options::{SceneArguments, positive_frequency, warn_left_out},
-};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
@@ -113,7 +105,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         .unwrap_or(DETUNINGS);
     if arguments.backbone {
         let of_structure = structure_curves(&loaded, &scene, range, false);
-        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), CURVE_ORBITS));
+        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), CURVE_POINTS));
         return shown(&scene, "Exact backbone", &curves, arguments.json, || listed(&curves)).map(Results::from);
     }
     if loaded.structure.is_some() {
@@ -167,9 +159,6 @@ fn of_a_structure(arguments: &Arguments, scene: &Scene, range: [f64; 2]) -> Resu
         responses(&numbers, curves, &backbone, range).svg()
     }))
 }
-
-/// Orbits on a curve.
-const CURVE_ORBITS: usize = 400;
 
 /// All components of the frequency response.
 fn components(arguments: &Arguments, scene: &Dimensionless, limits: &ContinuationLimits) -> Result<Results, Failure> {

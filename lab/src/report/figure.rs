@@ -28,11 +28,9 @@ const NEIGHBOUR_DISTANCE: f64 = 0.4;
 
 /// Rows of panels under a title and lines of a caption.
 pub struct Figure {
-    pub(super) title: String,
-    pub(super) caption: String,
-    /// Height of a row, px.
-    pub(super) height: f64,
-    pub(super) rows: Vec<Vec<Panel>>,
+    title: String,
+    caption: String,
+    rows: Vec<Vec<Panel>>,
 }
 
 /// One panel with its axes.
@@ -68,14 +66,27 @@ pub enum Shape {
 }
 
 impl Figure {
+    pub fn new(title: impl Into<String>, caption: String, rows: Vec<Vec<Panel>>) -> Self {
+        Self { title: title.into(), caption, rows }
+    }
+
+    /// Height of a row, px.
+    fn row_height(&self) -> f64 {
+        match &self.rows[..] {
+            [panels] if panels.iter().any(Panel::is_map) => 460.0,
+            [_] => 420.0,
+            _ => 300.0,
+        }
+    }
+
     /// The figure as SVG, for white paper.
     pub fn svg(&self) -> String {
-        let entries = self.entries();
+        let (entries, row_height) = (self.entries(), self.row_height());
         let longest = entries.iter().map(|entry| text_width(&entry.label)).fold(0.0, f64::max);
         let column = ENTRY.1 + 26.0 + longest;
         let columns = ((WIDTH - MARGINS[0]) / column).floor().max(1.0) as usize;
         let head = 40.0 + 18.0 * self.caption.lines().count() as f64;
-        let bottom = head + self.height * self.rows.len() as f64;
+        let bottom = head + row_height * self.rows.len() as f64;
         let height = bottom + ENTRY.0 * entries.len().div_ceil(columns) as f64 + 10.0;
         let mut svg = Svg(format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
@@ -88,16 +99,9 @@ impl Figure {
         }
         for (row, panels) in (0..).zip(&self.rows) {
             let width = WIDTH / panels.len() as f64;
+            let top = head + row_height * f64::from(row);
             for (n, panel) in (0..).zip(panels) {
-                panel.draw(
-                    &mut svg,
-                    [
-                        width * f64::from(n),
-                        head + self.height * f64::from(row),
-                        width,
-                        self.height,
-                    ],
-                );
+                panel.draw(&mut svg, [width * f64::from(n), top, width, row_height]);
             }
         }
         for (n, entry) in entries.iter().enumerate() {
@@ -140,12 +144,8 @@ impl Panel {
 
     /// A curve of motions, solid where they are stable, and dashed and paler where they are not.
     pub fn curve(&mut self, points: impl IntoIterator<Item = Marked>, width: f64, colour: &'static str, name: &str) {
-        self.pieces(
-            points,
-            width,
-            [colour, unstable(colour)],
-            [name, &format!("{name}, unstable")],
-        );
+        let names = [name, &format!("{name}, unstable")];
+        self.pieces(points, width, [colour, unstable(colour)], names);
     }
 
     /// The same in one colour, with one entry of the legend.
@@ -170,6 +170,10 @@ impl Panel {
         }
     }
 
+    fn is_map(&self) -> bool {
+        self.series.iter().any(|series| matches!(series.shape, Shape::Cells))
+    }
+
     /// Draws the panel in an area: left, top, width and height, px.
     fn draw(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4]) {
         let frame = Frame {
@@ -183,7 +187,7 @@ impl Panel {
         svg.0 += &format!(
             "<svg x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">\n"
         );
-        let is_map = self.series.iter().any(|series| matches!(series.shape, Shape::Cells));
+        let is_map = self.is_map();
         let (marks, curves): (Vec<_>, Vec<_>) = self.series.iter().partition(|series| series.is_mark());
         curves.iter().for_each(|series| series.draw(svg, &frame, is_map));
         svg.0 += "</svg>\n";
@@ -406,8 +410,7 @@ mod tests {
             .collect();
         assert_eq!(spans[..2], [(0.0, 2.0, "orbits"), (3.0, 3.0, "orbits")]);
         assert_eq!(spans[2..], [(2.0, 3.0, "orbits, unstable")]);
-        let (title, caption) = ("a < b".into(), String::new());
-        let svg = Figure { title, caption, height: 300.0, rows: vec![vec![panel]] }.svg();
+        let svg = Figure::new("a < b", String::new(), vec![vec![panel]]).svg();
         // The piece and its sample in the legend.
         assert_eq!(svg.matches("stroke-dasharray").count(), 2);
         assert_eq!(svg.matches("orbits, unstable</text>").count(), 1);

@@ -20,12 +20,9 @@ use crate::survey::Survey;
 use crate::theory::{self, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, reading};
 
 /// Points of a computed curve: at this figure size, neighbours are at most a few pixels apart.
-const CURVE_POINTS: usize = 400;
+pub const CURVE_POINTS: usize = 400;
 /// Only every fourth point along the decay is drawn, so that the circles do not overlap.
 const THINNED: usize = 4;
-/// Heights of a single row of panels and of each of two, px.
-const TALL: f64 = 420.0;
-const LOW: f64 = 300.0;
 
 const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";
 const SPEED: &str = "particle speed B, over b ω₀";
@@ -125,12 +122,8 @@ pub fn backbone(result: &Comparison) -> Figure {
         error_bars(&mut panel, std::iter::once((place, uncertainty)), vertical, range);
     }
     panel.add(Shape::Square, [place], MEASURED, LOCKED);
-    Figure {
-        title: format!("Backbone and free decay; resonance: {}", p.definition.name()),
-        caption: caption(p, &at(lock.g)),
-        height: TALL,
-        rows: vec![vec![panel]],
-    }
+    let title = format!("Backbone and free decay; resonance: {}", p.definition.name());
+    Figure::new(title, caption(p, &at(lock.g)), vec![vec![panel]])
 }
 
 /// Range of the particle speed on figures of the manifold: beyond the stable range.
@@ -155,12 +148,8 @@ pub fn manifold(result: &Comparison) -> Figure {
     let decay = decay.filter_map(|point| Some((point.b?, point.c)));
     circles(&mut panel, decay, IDENTIFIED);
     panel.add(Shape::Square, lock.b.map(|b| (b, lock.at.c)), MEASURED, LOCKED);
-    Figure {
-        title: "Slow invariant manifold and the free decay on it".into(),
-        caption: caption(p, &at(lock.at.g)),
-        height: TALL,
-        rows: vec![vec![panel]],
-    }
+    let title = "Slow invariant manifold and the free decay on it";
+    Figure::new(title, caption(p, &at(lock.at.g)), vec![vec![panel]])
 }
 
 /// The tracked backbone on the exact and the first-order curve, and the drive that holds each level; points that are not settled are
@@ -204,12 +193,9 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
     let places = || points().map(|point| (point.at.c, point.at.g));
     circles(&mut drive, places(), "tracked");
     error_bars(&mut drive, places().zip(points().map(|point| point.at.u_g)), true, high);
-    Figure {
-        title: "Backbone, tracked with the loop closed, and its drive".into(),
-        caption: caption(p, &format!("from {least:.3} to {most:.3}")),
-        height: TALL,
-        rows: vec![vec![backbone, drive]],
-    }
+    let title = "Backbone, tracked with the loop closed, and its drive";
+    let caption = caption(p, &format!("from {least:.3} to {most:.3}"));
+    Figure::new(title, caption, vec![vec![backbone, drive]])
 }
 
 /// What was measured beside the backbones of a scene and of the best hypothesis, and below them the residuals, over amplitude.
@@ -265,17 +251,17 @@ pub fn fitted(found: &Found, scene: &Scene) -> Figure {
         below.add(shape, places, colour, name);
     }
     let is_possible = if fit.excluded.is_some() { "excluded" } else { "possible" };
-    Figure {
-        title: "Measured points, scene and fit".into(),
-        caption: format!(
-            "{}: chi-square {:.1} for {} degrees of freedom, {is_possible}",
-            fit.hypothesis.names()[0],
-            fit.chi_square,
-            fit.degrees
-        ),
-        height: LOW,
-        rows: vec![vec![backbone], vec![below]],
-    }
+    let caption = format!(
+        "{}: chi-square {:.1} for {} degrees of freedom, {is_possible}",
+        fit.hypothesis.names()[0],
+        fit.chi_square,
+        fit.degrees
+    );
+    Figure::new(
+        "Measured points, scene and fit",
+        caption,
+        vec![vec![backbone], vec![below]],
+    )
 }
 
 /// A time (periods), an amplitude and a detuning.
@@ -312,12 +298,12 @@ pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
         circles(&mut right, points.iter().map(place), IDENTIFIED);
         vec![left, right]
     };
-    Figure {
-        title: "Seeking and holding resonance; free decay".into(),
-        caption: caption(p, &at(lock.at.g)),
-        height: LOW,
-        rows: vec![row(1, (0.0, top * 1.1), amplitude(p)), row(2, detunings, "detuning σ")],
-    }
+    let rows = vec![row(1, (0.0, top * 1.1), amplitude(p)), row(2, detunings, "detuning σ")];
+    Figure::new(
+        "Seeking and holding resonance; free decay",
+        caption(p, &at(lock.at.g)),
+        rows,
+    )
 }
 
 /// The decay along the manifold by first-order theory, from an amplitude.
@@ -387,38 +373,25 @@ pub fn theory(p: &Dimensionless) -> Figure {
             backbones.branch(piece.iter().copied(), width, colour, &format!("backbone, r = {r}"));
         }
     }
-    Figure {
-        title: format!("Slow invariant manifold; backbones by {}", p.definition.name()),
-        caption: format!("{}; dashed: unstable", caption(p, &at(p.g))),
-        height: TALL,
-        rows: vec![vec![manifold, backbones]],
-    }
+    let title = format!("Slow invariant manifold; backbones by {}", p.definition.name());
+    let caption = format!("{}; dashed: unstable", caption(p, &at(p.g)));
+    Figure::new(title, caption, vec![vec![manifold, backbones]])
 }
 
 /// The exact backbone of a structure beside that of its driven mode alone; frequencies and responses are those of the sensor.
 pub fn structure(scene: &Scene, survey: &Survey) -> Option<Figure> {
     let d = scene.dimensionless();
     let unit = scene.structure.as_ref()?.units().response.of_metres(d.b);
-    let curves = |branches: &[StructureBranch]| -> Vec<Vec<Marked>> {
-        let place = |orbit: &StructureOrbit| {
-            (
-                (d.sigma(orbit.omega), orbit.response / unit),
-                !orbit.stability.is_unstable(),
-            )
-        };
-        branches
-            .iter()
-            .map(|branch| branch.orbits.iter().map(place).collect())
-            .collect()
+    let place = |orbit: &StructureOrbit| {
+        let place = (d.sigma(orbit.omega), orbit.response / unit);
+        (place, !orbit.stability.is_unstable())
     };
-    let (alone, all) = (curves(&survey.facts.alone), curves(&survey.facts.all));
+    let curve = |branch: &StructureBranch| branch.orbits.iter().map(place).collect();
+    let [alone, all]: [Vec<Vec<Marked>>; 2] =
+        [&survey.facts.alone, &survey.facts.all].map(|branches| branches.iter().map(curve).collect());
     let top = 1.0;
-    let sigmas = alone
-        .iter()
-        .chain(&all)
-        .flatten()
-        .filter(|((_, c), _)| *c < top)
-        .map(|((sigma, _), _)| *sigma);
+    let places = alone.iter().chain(&all).flatten().map(|point| point.0);
+    let sigmas = places.filter(|(_, c)| *c < top).map(|(sigma, _)| sigma);
     let x = widened(range((f64::MAX, f64::MIN), sigmas), 0.06);
     let panel = |curves: &[Vec<Marked>], colour: &'static str, label: &str| {
         let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(&d)));
@@ -427,15 +400,13 @@ pub fn structure(scene: &Scene, survey: &Survey) -> Option<Figure> {
         }
         panel
     };
-    Some(Figure {
-        title: "Exact backbone: the driven mode alone, and all modes of the structure".into(),
-        caption: format!("{}; dashed: unstable", caption(&d, &at(d.g))),
-        height: TALL,
-        rows: vec![vec![
-            panel(&alone, THEORY, "driven mode alone"),
-            panel(&all, EXACT, "all modes"),
-        ]],
-    })
+    let panels = vec![
+        panel(&alone, THEORY, "driven mode alone"),
+        panel(&all, EXACT, "all modes"),
+    ];
+    let title = "Exact backbone: the driven mode alone, and all modes of the structure";
+    let caption = format!("{}; dashed: unstable", caption(&d, &at(d.g)));
+    Some(Figure::new(title, caption, vec![panels]))
 }
 
 /// The frequency response at the scene's G over a range of sigma, exact and first-order, and the exact backbone. A curve has sigma, C and B of its
@@ -455,7 +426,7 @@ pub fn responses(
     for curve in flow.frequency_responses(p.g, 600) {
         let points = curve.iter().map(|point| {
             let c = point.c * reading(p, point.b);
-            ((point.sigma, c), point.impacts_stable && point.slow_flow_stable)
+            ((point.sigma, c), point.is_stable())
         });
         panel.curve(points, 1.0, THEORY, first_order_beside(exact));
     }
@@ -464,10 +435,6 @@ pub fn responses(
         panel.curve(points, 2.2, EXACT, ORBITS);
     }
     add_exact(&mut panel, exact, PREDICTED, "exact backbone");
-    Figure {
-        title: format!("Frequency response, and backbone by {}", p.definition.name()),
-        caption: caption(p, &at(p.g)),
-        height: TALL,
-        rows: vec![vec![panel]],
-    }
+    let title = format!("Frequency response, and backbone by {}", p.definition.name());
+    Figure::new(title, caption(p, &at(p.g)), vec![vec![panel]])
 }

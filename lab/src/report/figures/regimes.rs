@@ -36,12 +36,7 @@ pub fn regimes(map: &Map) -> Figure {
     let several = (0..).zip(&map.cells).filter(|(_, cell)| !cell.coexisting.is_empty());
     let dots = several.map(|(n, _)| (x.at(n % x.points), y.at(n / x.points)));
     panel.add(Shape::Dot(1.0), dots, BORDER, "several regimes");
-    Figure {
-        title: "Regimes of the driven response".into(),
-        caption: caption(map),
-        height: 460.0,
-        rows: vec![vec![panel]],
-    }
+    Figure::new("Regimes of the driven response", caption(map), vec![vec![panel]])
 }
 
 /// Where a motion lies on a map over sigma and G.
