@@ -73,46 +73,27 @@ fn wait() {
             thread::sleep(LOOK);
         }
     }
-    super::say(format_args!("error: interrupted by {first}{}", zeroed().in_words()));
+    super::say(format_args!("error: {}", ended(first)));
     process::end(first.exit_code());
 }
 
-/// What has become of the drive.
-enum Zeroed {
-    /// Nothing but a simulation was driven.
-    Nothing,
-    Yes,
-    No(String),
-}
-
-impl Zeroed {
-    fn in_words(&self) -> String {
-        match self {
-            Self::Nothing => String::new(),
-            Self::Yes => "; the drive is zero".into(),
-            Self::No(reason) => {
-                format!("; zero could not be commanded, because {reason}: switch the drive off at the rig")
-            }
-        }
-    }
-}
-
-/// Commands a drive of zero, unless the rig has it.
-fn zeroed() -> Zeroed {
+/// Commands a drive of zero, unless the rig has it. Returns in words what has become of it; nothing if only a simulation was driven.
+fn zeroed() -> String {
     let Some(brake) = lock(&RIG).clone() else {
-        return Zeroed::Nothing;
+        return String::new();
     };
-    let no = |reason: &str| Zeroed::No(reason.into());
     let (done, is_done) = channel();
     thread::spawn(move || done.send(brake.zero()));
-    is_done
-        .recv_timeout(LAST)
-        .unwrap_or_else(|_| no("the rig does not answer"))
+    let answer = is_done.recv_timeout(LAST);
+    match answer.unwrap_or_else(|_| Err("the rig does not answer".into())) {
+        Ok(()) => "; the drive is zero".into(),
+        Err(reason) => format!("; zero could not be commanded, because {reason}: switch the drive off at the rig"),
+    }
 }
 
 /// After the end of a command upon a signal: whether the drive is zero, in words.
 pub(super) fn ended(signal: Signal) -> String {
-    format!("interrupted by {signal}{}", zeroed().in_words())
+    format!("interrupted by {signal}{}", zeroed())
 }
 
 // A rig that the thread can reach.
@@ -190,12 +171,12 @@ impl<R: Rig> Rig for Reachable<R> {
 
 impl Brake {
     /// Commands zero, as the last command was given. A zero counts when the rig has answered.
-    fn zero(self) -> Zeroed {
+    fn zero(self) -> Result<(), String> {
         let last = *lock(&self.last);
         let Some(rig) = self.rig.upgrade() else {
             return match last {
-                Last::Zero => Zeroed::Yes,
-                _ => Zeroed::No("the rig has failed".into()),
+                Last::Zero => Ok(()),
+                _ => Err("the rig has failed".into()),
             };
         };
         // A call that never returns holds the lock, and then the caller does not wait for this.
@@ -206,9 +187,9 @@ impl Brake {
             Last::Held => rig.hold(zero, self.sample_time),
             _ => rig.advance(zero, self.sample_time),
         };
-        match commanded.and_then(|()| rig.sense()) {
-            Ok(_) => Zeroed::Yes,
-            Err(error) => Zeroed::No(error.to_string()),
-        }
+        commanded
+            .and_then(|()| rig.sense())
+            .map(drop)
+            .map_err(|error| error.to_string())
     }
 }
