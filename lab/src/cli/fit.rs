@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use serde::Serialize;
@@ -137,7 +136,10 @@ struct Output<'a> {
 
 /// What the points say of a linear response.
 fn of_linear(verdict: &LinearVerdict) -> String {
-    let [f0, zeta] = verdict.linear.estimates().map(with_decimals);
+    let [f0, zeta] = verdict
+        .linear
+        .estimates()
+        .map(|one| with_decimals((one.value, one.uncertainty)));
     let rises = ["with the particle carried along", "with a free particle"]
         .into_iter()
         .zip(verdict.rises)
@@ -155,7 +157,7 @@ fn of_linear(verdict: &LinearVerdict) -> String {
 }
 
 /// A value and its standard uncertainty with two digits of it.
-fn with_decimals(Estimate { value, uncertainty }: Estimate) -> String {
+fn with_decimals((value, uncertainty): (f64, f64)) -> String {
     if !uncertainty.is_finite() {
         return "not determined".into();
     }
@@ -367,26 +369,19 @@ fn recorded(stretches: &[Stretch]) -> String {
 fn hypotheses(report: &FitReport) -> Table {
     let rows = report.hypotheses.iter().map(|one| {
         let HypothesisReport { hypothesis, symbol, unit, chi_square, degrees, .. } = one;
-        let strength = one.strength.zip(one.u_strength).map(|(value, uncertainty)| {
-            format!(
-                "{symbol} = {}",
-                with_unit(&with_decimals(Estimate { value, uncertainty }), unit)
-            )
-        });
-        let friction = one.friction.zip(one.u_friction);
-        let friction =
-            friction.map(|(value, uncertainty)| format!("mu = {}", with_decimals(Estimate { value, uncertainty })));
-        let value = |n: usize| {
-            one.parameters.get(n).map_or_else(String::new, |parameter| {
-                with_decimals(Estimate { value: parameter.value, uncertainty: parameter.uncertainty })
-            })
-        };
-        let p = one.p_value.map_or_else(String::new, |p| {
-            if p < 1e-3 {
-                format!("{p:.0e}")
-            } else {
-                format!("{p:.3}")
-            }
+        let strength = one.strength.zip(one.u_strength).map(with_decimals);
+        let strength = strength.map(|value| format!("{symbol} = {}", with_unit(&value, unit)));
+        let friction = one.friction.zip(one.u_friction).map(with_decimals);
+        let friction = friction.map(|value| format!("mu = {value}"));
+        let values = one
+            .parameters
+            .iter()
+            .map(|one| with_decimals((one.value, one.uncertainty)));
+        let values: Vec<String> = values.collect();
+        let value = |n: usize| values.get(n).cloned().unwrap_or_default();
+        let p = one.p_value.map(|p| match p < 1e-3 {
+            true => format!("{p:.0e}"),
+            false => format!("{p:.3}"),
         });
         cells![
             *hypothesis,
@@ -398,7 +393,7 @@ fn hypotheses(report: &FitReport) -> Table {
             value(4),
             format!("{chi_square:.1}"),
             *degrees,
-            p,
+            p.unwrap_or_default(),
             if one.excluded.is_some() { "excluded" } else { "possible" }
         ]
     });
@@ -414,7 +409,7 @@ fn parameters(report: &FitReport) -> Table {
         let [value, expected, difference] = match exact(parameter) {
             Some(value) => [format!("{value} (exact)"), format!("{expected:.4}"), String::new()],
             None => [
-                with_decimals(Estimate { value, uncertainty }) + doubt,
+                with_decimals((value, uncertainty)) + doubt,
                 format!("{expected:.0$}", decimals(uncertainty)),
                 Some((value - expected) / uncertainty)
                     .filter(|u| u.is_finite())
@@ -482,33 +477,13 @@ fn contradiction(found: &Found, report: &FitReport, scene: &Scene) -> String {
     }
 }
 
-/// The date in UTC, as `2026-11-29`. Years begin on 1 March, so that a leap day is the last day of one (H. Hinnant, chrono-Compatible
-/// Low-Level Date Algorithms, `civil_from_days`).
-fn date(time: SystemTime) -> String {
-    let seconds = time.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
-    // Days since 1 March of the year 0, and in an era of 400 years.
-    let days = seconds / 86_400 + 719_468;
-    let (era, day) = (days / 146_097, days % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let day = day - (153 * month + 2) / 5 + 1;
-    let (year, month) = if month < 10 {
-        (year, month + 3)
-    } else {
-        (year + 1, month - 9)
-    };
-    format!("{:04}-{month:02}-{day:02}", 400 * era + year)
-}
-
 /// Where the plant of a scene comes from.
 fn provenance(files: &[PathBuf], report: &FitReport) -> String {
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let p = report.p_value.map_or_else(String::new, |p| format!(", p = {p:.2}"));
     format!(
-        "# Fitted by vines {} on {} to {}: {},\n# chi-square {:.1} for {} degrees of freedom{p}.\n\n",
+        "# Fitted by vines {} to {}: {},\n# chi-square {:.1} for {} degrees of freedom{p}.\n\n",
         env!("CARGO_PKG_VERSION"),
-        date(SystemTime::now()),
         files.join(", "),
         report.best,
         report.chi_square,
