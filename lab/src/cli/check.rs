@@ -1,14 +1,12 @@
 //! `vines check`: the loop before the drive rises.
 
 use clap::Args;
+use vines::cells;
 use vines::experiment::ExperimentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
 use vines::scene::{Excitation, Scene};
-use vines::{
-    cells,
-    table::{Table, number, with_uncertainty},
-};
+use vines::table::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
 use super::options::{Endpoint, ReachArguments, SceneArguments};

@@ -6,18 +6,16 @@ use std::io;
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use vines::cells::CellError;
+use vines::experiment::ExperimentError;
 use vines::fmu::{FmuError, Obstacle};
 use vines::identification::IdentificationError;
+use vines::net::{Address, LinkError};
 use vines::orbit::NoMotion;
+use vines::pack::PackError;
 use vines::report::ReportError;
 use vines::rig::{ControllerError, Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{
-    ArgumentError, FileError,
-    experiment::ExperimentError,
-    net::{Address, LinkError},
-    pack::PackError,
-};
+use vines::{ArgumentError, FileError};
 
 /// Exit code of an experiment that a signal ended; that of the program is of the signal ([`super::signals`]).
 pub(super) const INTERRUPTED: u8 = 130;

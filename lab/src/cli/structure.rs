@@ -5,13 +5,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
+use vines::cells;
 use vines::orbit::{Bifurcation, StabilityChange, StructureBranch, StructureOrbit};
 use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
-use vines::{
-    cells,
-    table::{Cell, Table},
-};
+use vines::table::{Cell, Table};
 
 use super::output::{Results, output, progress_bar, stability, writable};
 use super::{failure::Failure, options::SceneArguments};

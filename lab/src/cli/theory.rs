@@ -4,19 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use vines::{
-    cells,
-    report::theory,
-    table::{Cell, Table},
-    theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant},
-};
+use vines::table::{Cell, Table};
+use vines::theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backbone, resonant};
+use vines::{cells, report::theory};
 
+use super::failure::Failure;
+use super::options::{SceneArguments, positive_frequency};
 use super::output::{Results, output, writable};
 use super::summary::parameters;
-use super::{
-    failure::Failure,
-    options::{SceneArguments, positive_frequency},
-};
 
 const HELP: &str = "\
 Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold
