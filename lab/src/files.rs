@@ -43,9 +43,6 @@ pub fn writable(path: &Path) -> Result<(), FileError> {
 }
 
 /// Writes one file, complete or not at all; its folder is created if it does not exist. A device or a pipe is written to directly.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_file(path: &Path, content: &str) -> Result<PathBuf, FileError> {
     let write = || -> io::Result<()> {
         if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
@@ -64,9 +61,6 @@ pub fn write_file(path: &Path, content: &str) -> Result<PathBuf, FileError> {
 }
 
 /// Creates the folder of a file, if it does not exist.
-///
-/// # Errors
-/// That of the system.
 pub fn create_folder_of(path: &Path) -> io::Result<()> {
     fs::create_dir_all(folder_of(path))
 }
@@ -135,9 +129,6 @@ impl ResultFolder {
     }
 
     /// Replaces the files of an earlier run by these. All are written under temporary names before the first old one goes.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn replace<N: AsRef<Path>, C: AsRef<[u8]>>(
         &self,
         files: impl IntoIterator<Item = (N, C)>,
@@ -161,9 +152,6 @@ impl ResultFolder {
     }
 
     /// Writes `name`, all that a run without results leaves. Results of an earlier run move to a folder, which is returned if there are any.
-    ///
-    /// # Errors
-    /// A file that cannot be written or moved.
     pub fn interrupt(&self, name: &str, content: &str) -> Result<(PathBuf, Option<PathBuf>), FileError> {
         let names = || self.names.iter().filter(|result| **result != name);
         let previous = names().any(|name| self.path.join(name).exists());

@@ -37,9 +37,6 @@ fn at_cell(structure: &Structure) -> Option<String> {
 }
 
 /// Loads the plant at `path` with parameters and start of the scene, and gives it the sensors of the scene.
-///
-/// # Errors
-/// Errors of the FMU.
 pub fn load(path: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
     let (names, definition) = (&scene.rig_names, scene.resonance);
     let structure = scene.structure.as_ref();

@@ -68,9 +68,6 @@ pub fn components() -> [Component; 2] {
 }
 
 /// The plant of a scene and the controller.
-///
-/// # Errors
-/// A description that is not XML, and values that the plant refuses.
 pub fn components_of(scene: &Scene) -> Result<[Component; 2], PackError> {
     let [oscillator, controller] = components();
     let plant = match &scene.structure {
@@ -104,9 +101,6 @@ impl FromStr for Binary {
 }
 
 /// The libraries of components for this machine, in a folder, under the names that cargo gives them.
-///
-/// # Errors
-/// A library that the system does not load, or that is not one of FMI 2.0.
 pub fn own_libraries(components: &[Component], folder: &Path) -> Result<Vec<Binary>, PackError> {
     let mut binaries = Vec::new();
     for Component { identifier, package, .. } in components {

@@ -34,19 +34,16 @@ pub struct Axis {
 
 impl Axis {
     /// The n-th value.
-    #[must_use]
     pub fn at(&self, n: u64) -> f64 {
         self.from + self.step() * n as f64
     }
 
     /// Distance of two neighbouring values.
-    #[must_use]
     pub fn step(&self) -> f64 {
         (self.to - self.from) / (self.points - 1) as f64
     }
 
     /// The name: short where there is a short one.
-    #[must_use]
     pub fn name(&self) -> &str {
         let short = SHORT_NAMES.iter().find(|(_, key)| *key == self.key);
         short.map_or(&self.key, |(short, _)| short)
@@ -151,16 +148,12 @@ impl Map {
     }
 
     /// Number of cells.
-    #[must_use]
     pub fn size(&self) -> u64 {
         self.x.points * self.y.points
     }
 
     /// Computes all cells on all cores; calls `done` after each. `confirmations` motions from starts close by must lead to the same
     /// regime where chance decides when chaos ends.
-    ///
-    /// # Errors
-    /// Values that scene or plant refuse.
     pub fn run(&mut self, confirmations: usize, done: impl Fn() + Sync) -> Result<(), CellError> {
         let cells = (0..self.size()).into_par_iter().map(|n| {
             let place = [self.x.at(n % self.x.points), self.y.at(n / self.x.points)];
@@ -215,13 +208,11 @@ impl Map {
     }
 
     /// Names of the axes, horizontal first: sigma, G, r, or a key of the scene.
-    #[must_use]
     pub fn names(&self) -> [&str; 2] {
         [self.x.name(), self.y.name()]
     }
 
     /// First-order theory has a stable symmetric 1:1 motion at a point of the plane.
-    #[must_use]
     pub fn theory_stable(&self, x: f64, y: f64) -> bool {
         self.common.at(&[x, y]).is_ok_and(|Cell { sigma, numbers, .. }| {
             SlowFlow::new(numbers.lambda, numbers.r).has_stable_motion(numbers.g, sigma)
@@ -229,7 +220,6 @@ impl Map {
     }
 
     /// How many cells show a regime, and how many of them lie where theory has a stable 1:1 motion.
-    #[must_use]
     pub fn count(&self, regime: Regime) -> (usize, usize) {
         let cells = || self.cells.iter().filter(|cell| cell.result.regime == regime);
         (cells().count(), cells().filter(|cell| cell.theory_stable).count())

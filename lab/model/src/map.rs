@@ -33,9 +33,6 @@ const FIRST_EXAMINED: usize = 16;
 
 /// Drives the dimensionless plant of `scene` at the detuning `sigma` from `start` = (q1, q1', q2, q2') until its regime is decided, for
 /// at most `limit` periods. A motion that settles on a periodic one, or cannot reach a wall, is decided earlier.
-///
-/// # Errors
-/// Invalid parameters or an invalid start.
 pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<RegimeResult, InvalidValue> {
     CellRun::new(scene, sigma, start)?.decided(0, limit)
 }
@@ -123,9 +120,6 @@ pub struct CellRun {
 
 impl CellRun {
     /// The dimensionless plant of `scene` at the detuning `sigma`, from `start` = (q1, q1', q2, q2').
-    ///
-    /// # Errors
-    /// Invalid parameters or an invalid start.
     pub fn new(scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<Self, InvalidValue> {
         Ok(Self {
             scene: *scene,

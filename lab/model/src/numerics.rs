@@ -122,7 +122,6 @@ where
 }
 
 /// Eigenvalues of a square matrix; NaN if it contains one, or where the QR algorithm does not converge: some matrices it turns for ever.
-#[must_use]
 pub fn eigenvalues(matrix: DMatrix<f64>) -> Vec<Complex<f64>> {
     let size = matrix.nrows();
     let found = Schur::try_new(matrix, f64::EPSILON, MOST_CORRECTIONS * size);

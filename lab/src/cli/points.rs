@@ -113,9 +113,6 @@ pub enum Source {
 }
 
 /// Reads JSON or a plain table. Other files are refused with the command that reads them.
-///
-/// # Errors
-/// A file that cannot be read, or is neither.
 pub(super) fn plain(path: &Path) -> Result<Source, ArgumentError> {
     let file = path.display();
     let python = |reason: &str| {
@@ -157,9 +154,6 @@ pub(super) fn is_own(contents: &Contents) -> bool {
 }
 
 /// What is measured in a file: points if it has one of their columns or `reading` names some, otherwise a recording.
-///
-/// # Errors
-/// A file without one of the columns, or with a value that is not a number.
 pub(super) fn measurement(
     path: &Path,
     source: Source,
@@ -281,7 +275,6 @@ fn objects(value: &Value) -> Option<Vec<Row>> {
 }
 
 /// A Boolean by the words that this program, Python, spreadsheets in English and German, and numbers have for it; `None` for others.
-#[must_use]
 pub fn truth(word: &str) -> Option<bool> {
     match &*word.trim().to_lowercase() {
         "true" | "wahr" | "1" | "1.0" => Some(true),

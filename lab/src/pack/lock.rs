@@ -94,9 +94,6 @@ const SINE_PERIODS: u32 = 20;
 
 /// The files of a structure under a sine of its driven mode's frequency: the inputs of signal and amplitude, and the amplitude that it has. `parameters`: the set of its
 /// parameters; `step`: the time from sample to sample, s.
-///
-/// # Errors
-/// Values that the plant refuses.
 pub(super) fn sine(
     (structure, scene): (&Structure, &Scene),
     ([signal, input], amplitude): ([&str; 2], f64),

@@ -22,9 +22,6 @@ const IDENTIFIER: &str = "Structure";
 const FILE: &str = "resources/structure.json";
 
 /// The FMU of a structure, which has the library of the oscillator.
-///
-/// # Errors
-/// A description that is not XML, and values that the plant refuses.
 pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -> Result<Component, PackError> {
     let starts = scene
         .start_values()
@@ -274,9 +271,6 @@ impl DriveKind {
 const BASE: [&str; 3] = ["e", "E", "base"];
 
 /// The description of a structure, from that of `LoViNes.fmu`.
-///
-/// # Errors
-/// A text that is not XML.
 fn describe(oscillator: &str, facts: &Facts<'_>) -> Result<String, Error> {
     let mut root = Element::parse(oscillator)?;
     root.set("modelName", IDENTIFIER);

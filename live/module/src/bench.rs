@@ -62,9 +62,6 @@ pub struct Bench {
 
 impl Bench {
     /// The bench of the settings at its start.
-    ///
-    /// # Errors
-    /// The message for a value that plant or controller refuse.
     pub fn new(settings: Settings) -> Result<Self, Message> {
         let scene = changed(default_scene(), &settings);
         let plant = Plant::new(scene.plant, scene.start)?;
@@ -85,7 +82,6 @@ impl Bench {
     }
 
     /// The settings of the default scene.
-    #[must_use]
     pub fn default_settings() -> [f64; COUNT] {
         settings_of(&default_scene())
     }
@@ -134,9 +130,6 @@ impl Bench {
     }
 
     /// Takes `samples` samples and hands the rows of the record to `on_row`.
-    ///
-    /// # Errors
-    /// The message for a drive that the plant refuses.
     pub fn run(&mut self, samples: usize, mut on_row: impl FnMut(&Row)) -> Result<(), Message> {
         for left in (0..samples).rev() {
             // Only the last sample can be looked into. A plant is large, and WebAssembly copies the output in a call, too.
@@ -203,13 +196,11 @@ impl Bench {
     }
 
     /// Time of the next sample, s.
-    #[must_use]
     pub fn time(&self) -> f64 {
         self.samples as f64 * self.controller.lock.config().sample_time
     }
 
     /// The plant `ahead` seconds after the last sample: for slow motion between two samples.
-    #[must_use]
     pub fn between(&self, ahead: f64) -> Plant {
         let (mut plant, drive) = self.before;
         // The drive was accepted for the whole sample period; a shorter step cannot be refused.
@@ -219,7 +210,6 @@ impl Bench {
     }
 
     /// Time from the last sample to the first impact after it and before the next sample, s; its wall.
-    #[must_use]
     pub fn first_impact(&self, later_than: f64) -> Option<(f64, Wall)> {
         let (mut plant, drive) = self.before;
         let mut first = None;
@@ -243,28 +233,22 @@ impl Bench {
     }
 
     /// Speed of the particle over `b omega0`.
-    #[must_use]
     pub fn particle_speed(&self) -> f64 {
         self.scene.dimensionless().speed(self.rig.plant.state().dq2.abs())
     }
 
     /// The regime of the last impacts.
-    #[must_use]
     pub fn regime(&self) -> Regime {
         self.rig.impacts.regime(self.rig.phase)
     }
 
     /// Amplitude of the drive, m.
-    #[must_use]
     pub fn drive_amplitude(&self) -> f64 {
         self.before.1.amplitude
     }
 
     /// Puts the primary mass (together with the particle) or the particle alone somewhere, at rest: `to` is the displacement over b
     /// of the mass, or of the particle from the middle of its cavity. Base, clock and controller run on.
-    ///
-    /// # Errors
-    /// The message for a displacement that the plant refuses.
     pub fn place(&mut self, primary: bool, to: f64) -> Result<(), Message> {
         let b = self.scene.plant.half_width;
         let plant = &mut self.rig.plant;
@@ -284,7 +268,6 @@ impl Bench {
     }
 
     /// The plant at the next sample.
-    #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.rig.plant
     }
@@ -308,9 +291,6 @@ const RELAXATIONS: f64 = 6.0;
 const MOST_PERIODS: f64 = 1000.0;
 
 /// The regime under a constant drive of detuning `sigma` and excitation `g`, from the start of the scene.
-///
-/// # Errors
-/// The message for a drive that the plant refuses.
 pub fn regime_at(scene: &Scene, sigma: f64, g: f64) -> Result<Regime, Message> {
     let d = scene.dimensionless();
     let omega = d.omega(sigma);

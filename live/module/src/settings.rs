@@ -18,7 +18,6 @@ use generated::{EXCITATION, PLANT, START};
 pub type Settings = [f64; COUNT];
 
 /// The scene in lab/scene/paper.toml.
-#[must_use]
 pub fn default_scene() -> Scene {
     let [primary_mass, stiffness, damping, particle_mass, half_width, restitution] = PLANT;
     let plant = Parameters {
@@ -50,7 +49,6 @@ pub fn default_scene() -> Scene {
 }
 
 /// The settings of a scene, with the loop closed and without noise.
-#[must_use]
 pub fn settings_of(scene: &Scene) -> Settings {
     let d = scene.dimensionless();
     let mut values = [0.0; COUNT];
@@ -71,7 +69,6 @@ pub fn settings_of(scene: &Scene) -> Settings {
 }
 
 /// `scene` with the values that differ from its own replaced. The others keep all their bits.
-#[must_use]
 pub fn changed(mut scene: Scene, values: &Settings) -> Scene {
     let before = settings_of(&scene);
     let differs = |one: usize| values[one] != before[one];

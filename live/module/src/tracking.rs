@@ -73,9 +73,6 @@ impl Controller for Ahead<'_> {
 }
 
 /// Tracks the backbone with a controller, from its state before the sample `sample` on, on a copy of the rig.
-///
-/// # Errors
-/// The message of a lab's error, such as no lock.
 pub fn track(scene: &Scene, rig: &NoisyRig, controller: BuiltIn, sample: u64) -> Result<Tracking, Message> {
     let last = Cell::new((sample, 0.0));
     let mut controller = Ahead { controller, last: &last, moves: Vec::new() };
