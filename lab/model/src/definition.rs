@@ -129,18 +129,10 @@ impl Definition {
 
     /// The definition with these [channels](Self::channels).
     pub fn of_channels(channels: u8) -> Option<Self> {
-        let quantities = |one: Self| {
-            let of_base = move |of_response| {
-                Measurand::ALL.map(|of_base| Self {
-                    sensor_quantity: of_response,
-                    reference_quantity: of_base,
-                    ..one
-                })
-            };
-            Measurand::ALL.into_iter().flat_map(of_base)
-        };
-        let mut every = Self::all().into_iter().flat_map(quantities);
-        every.find(|one| one.channels() == channels)
+        let quantity = |bits: u8| Measurand::ALL.get(usize::from(bits & 3)).copied();
+        let (sensor_quantity, reference_quantity) = (quantity(channels >> 3)?, quantity(channels >> 5)?);
+        let of = |one: Self| Self { sensor_quantity, reference_quantity, ..one };
+        Self::all().into_iter().map(of).find(|one| one.channels() == channels)
     }
 
     /// The channels in words: response and reference.

@@ -28,31 +28,17 @@ pub struct Dimensionless {
 impl Dimensionless {
     /// The bare dimensionless model, with `omega0 = 1` and `b = 1`.
     pub fn new(epsilon: f64, lambda: f64, r: f64, g: f64) -> Self {
-        Self {
-            epsilon,
-            lambda,
-            r,
-            g,
-            omega0: 1.0,
-            b: 1.0,
-            definition: Definition::default(),
-        }
+        let definition = Definition::default();
+        Self { epsilon, lambda, r, g, omega0: 1.0, b: 1.0, definition }
     }
 
     /// The numbers of a plant in SI units whose base moves with the amplitude `amplitude`, m.
     pub fn of(plant: &Parameters, amplitude: f64) -> Self {
-        let omega0 = plant.natural_frequency();
-        let mut numbers = Self {
-            epsilon: plant.mass_ratio(),
-            lambda: plant.damping / (plant.particle_mass * omega0),
-            r: plant.restitution,
-            g: 0.0,
-            omega0,
-            b: plant.half_width,
-            definition: Definition::default(),
-        };
-        numbers.g = numbers.excitation(amplitude);
-        numbers
+        let (omega0, b) = (plant.natural_frequency(), plant.half_width);
+        let lambda = plant.damping / (plant.particle_mass * omega0);
+        let numbers = Self::new(plant.mass_ratio(), lambda, plant.restitution, 0.0);
+        let numbers = Self { omega0, b, ..numbers };
+        Self { g: numbers.excitation(amplitude), ..numbers }
     }
 
     /// Excitation `G = E/(b epsilon)` of the base amplitude `E`, m.

@@ -62,9 +62,9 @@ pub trait Equations<const N: usize> {
 /// its largest size. The unknowns are numbers of order one.
 pub(crate) const CONVERGED: f64 = 1e-12;
 const CORRECTION_ROUNDING: f64 = 1e-10;
-/// Largest number of corrections, of steps of the QR algorithm for an eigenvalue (as in LAPACK's dhseqr), and of halvings of a correction that does not
-/// reduce the residuals.
-const MOST_CORRECTIONS: usize = 30;
+/// Largest number of steps of an iteration, of the QR algorithm for each eigenvalue: far more than one that converges needs.
+pub(crate) const MOST_STEPS: usize = 100;
+/// Largest number of halvings of a correction that does not reduce the residuals.
 const HALVINGS: usize = 6;
 
 /// The solution near `x` by Newton's method, in steps that reduce the norm of the residuals. Where the equations leave a direction free, the
@@ -75,7 +75,7 @@ where
 {
     let (mut residual, mut jacobian) = equations.at(&x)?;
     let mut last = f64::INFINITY;
-    for _ in 0..MOST_CORRECTIONS {
+    for _ in 0..MOST_STEPS {
         let correction = solve(jacobian, &residual)?;
         let size = correction.norm();
         if size < CONVERGED || size < CORRECTION_ROUNDING && size > 0.5 * last {
@@ -124,7 +124,7 @@ where
 /// Eigenvalues of a square matrix; NaN if it contains one, or where the QR algorithm does not converge: some matrices it turns for ever.
 pub fn eigenvalues(matrix: DMatrix<f64>) -> Vec<Complex<f64>> {
     let size = matrix.nrows();
-    let found = Schur::try_new(matrix, f64::EPSILON, MOST_CORRECTIONS * size);
+    let found = Schur::try_new(matrix, f64::EPSILON, MOST_STEPS * size);
     found.map_or_else(
         || vec![Complex::new(f64::NAN, f64::NAN); size],
         |schur| schur.complex_eigenvalues().as_slice().to_vec(),
@@ -138,7 +138,7 @@ const SINGULAR: f64 = 1e-14;
 /// steps do not become as small, or where `f` is `None`.
 pub fn secant(mut f: impl FnMut(f64) -> Option<f64>, [mut before, mut here]: [f64; 2], tolerance: f64) -> Option<f64> {
     let mut at_before = f(before)?;
-    for _ in 0..MOST_CORRECTIONS {
+    for _ in 0..MOST_STEPS {
         iteration();
         let at_here = f(here)?;
         let step = if at_here == 0.0 {
@@ -310,9 +310,6 @@ pub struct LeastSquares<const N: usize, T> {
     /// What the last evaluation left.
     pub trace: T,
 }
-
-/// Largest number of steps of [`LeastSquares::minimum`].
-const MOST_STEPS: usize = 100;
 
 impl<const N: usize, T: Clone> LeastSquares<N, T>
 where

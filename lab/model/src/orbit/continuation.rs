@@ -106,15 +106,8 @@ impl Serialize for Branch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         fn drawn(motion: &Periodic) -> DrawnMotion<'_> {
             let Periodic { g, sigma, c, gamma, b, .. } = *motion;
-            DrawnMotion {
-                g,
-                sigma,
-                c,
-                gamma,
-                b,
-                stability: &motion.stability,
-                start: motion.bounces[0],
-            }
+            let (stability, start) = (&motion.stability, motion.bounces[0]);
+            DrawnMotion { g, sigma, c, gamma, b, stability, start }
         }
         let points: Vec<DrawnMotion> = self.drawn().into_iter().map(drawn).collect();
         let mut fields = serializer.serialize_struct("Branch", 4)?;
@@ -345,12 +338,8 @@ fn continue_from(
     towards: &Unknowns,
     limits: &ContinuationLimits,
 ) -> Branch {
-    let curve = Curve {
-        scene,
-        pattern: &start.pattern,
-        condition,
-        reach: APPROACH * limits.step,
-    };
+    let (pattern, reach) = (&start.pattern, APPROACH * limits.step);
+    let curve = Curve { scene, pattern, condition, reach };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),

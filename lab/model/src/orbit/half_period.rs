@@ -44,12 +44,8 @@ impl HalfPeriod {
         let ([sections @ .., (_, line)], b) = (&parts[..], particle.half_width) else {
             return None;
         };
-        let flight = Flight {
-            sections,
-            harmonic: motion.cavity,
-            omega: motion.omega,
-            particle: [line[0], motion.speed],
-        };
+        let (harmonic, omega, particle) = (motion.cavity, motion.omega, [line[0], motion.speed]);
+        let flight = Flight { sections, harmonic, omega, particle };
         let (elapsed, wall) = flight.contact([b, motion.after[1] - motion.speed], b, 1.0)?;
         let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < ORBIT_ERROR;
         is_half_a_period.then(|| Self {

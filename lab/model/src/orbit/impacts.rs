@@ -55,12 +55,8 @@ impl ImpactPattern {
 
     /// The same pattern over a whole period, as after symmetry breaking.
     pub fn doubled(&self) -> Self {
-        let mut walls = self.walls.clone();
-        if self.mirrored {
-            walls.extend(self.walls.iter().map(|wall| -wall));
-        } else {
-            walls.extend(&self.walls);
-        }
+        let again = self.walls.iter().map(|wall| self.sign() * wall);
+        let walls = self.walls.iter().copied().chain(again).collect();
         Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
     }
 
@@ -140,10 +136,8 @@ pub(super) struct Impacts {
 impl Impacts {
     /// From a state (q1, q1', q2, q2') at a phase of the base.
     pub(super) fn new(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Self> {
-        let (parameters, drive) = (
-            Parameters::dimensionless(scene.epsilon, scene.lambda, scene.r),
-            scene.drive(sigma),
-        );
+        let parameters = Parameters::dimensionless(scene.epsilon, scene.lambda, scene.r);
+        let drive = scene.drive(sigma);
         let plant = plant_at(&parameters, state.into(), drive, phase).filter(|_| drive.omega > 0.0)?;
         Some(Self { plant, drive, phase })
     }
@@ -216,7 +210,7 @@ impl ImpactSection<'_> {
             scale: Unknowns::from([1.0, 1.0, 1.0, 1.0, scene.epsilon, scene.epsilon]),
         };
         let apart = start.apart(&at, pattern.turn(), pattern.sign());
-        Some(shooting.returned(&drive, pattern.turn(), apart, shot.harmonic(), &by))
+        Some(shooting.returned(&drive, pattern.turn(), apart, shot.harmonic, &by))
     }
 }
 

@@ -14,6 +14,8 @@
 use lovines::Section;
 use nalgebra::{Complex, Matrix2, RowVector2, Vector2};
 
+use crate::numerics::MOST_STEPS;
+
 /// The polynomial `a + b z` as `[a, b]`.
 type Line = [f64; 2];
 
@@ -36,8 +38,6 @@ pub(super) struct Impact {
 /// Size of the last correction of a zero, over the larger of its modulus and 1, and, where rounding lets it fall no further, the largest.
 const ZERO_CONVERGED: f64 = 1e-13;
 const ZERO_ROUNDING: f64 = 1e-9;
-/// Largest number of rounds.
-const MOST_ROUNDS: usize = 60;
 /// Distance of the start from the zeros of `det(F + z)`, over their moduli. Exactly there, double ones would not part, and pairs could not become
 /// real.
 const START_OFFSET: f64 = 1e-3;
@@ -118,7 +118,7 @@ fn field(section: &Section) -> Matrix2<f64> {
 fn correct(zeros: &mut [Complex<f64>], parts: &[Part], impact: Impact) -> Option<()> {
     // The last corrections; of a zero that is found, 0.
     let mut last = vec![f64::INFINITY; zeros.len()];
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MOST_STEPS {
         for n in 0..zeros.len() {
             if last[n] == 0.0 {
                 continue;

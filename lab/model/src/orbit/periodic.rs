@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::impacts::{Bounce, ImpactPattern, ImpactSection, Impacts};
 use super::return_map::{Closing, Condition, Return, Stability, Unknowns};
 use crate::Dimensionless;
+use crate::numerics::newton;
 
 /// A phase in (-pi, pi].
 pub(super) fn wrapped(phase: f64) -> f64 {
@@ -54,7 +55,7 @@ impl Periodic {
         conditions: [Condition; 2],
     ) -> Option<Self> {
         let map = &mut ImpactSection { scene, pattern };
-        let x = Closing { map, conditions }.solve(*guess)?;
+        let x = newton(&mut Closing { map, conditions }, *guess)?;
         Self::at(scene, pattern, &x)
     }
 

@@ -18,7 +18,7 @@ use super::periodic::SETTLING_DISTANCE;
 use super::return_map::{Closing, Condition, Return, ReturnMap, Stability, Unknowns};
 use super::shooting::{Shooting, Shot, plant_at};
 use super::study::{at_amplitude, at_speed, stable_resonant};
-use crate::numerics::Equations;
+use crate::numerics::{Equations, newton};
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 use crate::{Definition, Dimensionless};
 
@@ -417,7 +417,7 @@ impl<'a> PhaseSection<'a> {
         self.phase = phase.rem_euclid(TAU);
         self.centre(&mut x, false).ok_or(NoMotion::NotConverged)?;
         let mut closing = Closing { map: &mut self, conditions };
-        let found = closing.solve(x).and_then(|at| Some((at, closing.at(&at)?.1)));
+        let found = newton(&mut closing, x).and_then(|at| Some((at, closing.at(&at)?.1)));
         let (at, jacobian) = found.ok_or(NoMotion::NotConverged)?;
         let motion = self.motion(&at).ok_or(NoMotion::NotConverged)?;
         let side = jacobian.determinant().signum();
@@ -480,7 +480,7 @@ impl ReturnMap for PhaseSection<'_> {
         let sign = if self.is_mirrored { -1.0 } else { 1.0 };
         by.fixed_rows_mut::<4>(0).scale_mut(sign);
         let apart = Vector4::from(self.numbers.state(&end)) * sign - x.fixed_rows::<4>(0);
-        Some(shooting.returned(&drive, self.turn(), apart, shot.harmonic(), &by))
+        Some(shooting.returned(&drive, self.turn(), apart, shot.harmonic, &by))
     }
 
     fn restarted(&mut self, x: &Unknowns) -> Option<Unknowns> {

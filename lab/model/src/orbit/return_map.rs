@@ -6,7 +6,7 @@
 use nalgebra::{Complex, DMatrix, Matrix4, Matrix4x6, Matrix6, RowVector6, Vector4, Vector6};
 use serde::Serialize;
 
-use crate::numerics::{Equations, eigenvalues, newton};
+use crate::numerics::{Equations, eigenvalues};
 
 /// Unknowns of a periodic motion: four coordinates at its section, sigma, G.
 pub type Unknowns = Vector6<f64>;
@@ -231,13 +231,6 @@ impl Condition {
 pub(super) struct Closing<'a, M> {
     pub map: &'a mut M,
     pub conditions: [Condition; 2],
-}
-
-impl<M: ReturnMap> Closing<'_, M> {
-    /// The solution near `guess`; None if the iteration leads to motions that do not return, or does not converge.
-    pub(super) fn solve(&mut self, guess: Unknowns) -> Option<Unknowns> {
-        newton(self, guess)
-    }
 }
 
 impl<M: ReturnMap> Equations<6> for Closing<'_, M> {

@@ -33,7 +33,7 @@ pub(super) struct Shot {
     phase: f64,
     omega: f64,
     /// The integral of `q2 exp(-i phase)` over time, and its derivatives by (q1, q1', q2, q2') at the start, frequency and amplitude.
-    harmonic: Complex<f64>,
+    pub harmonic: Complex<f64>,
     harmonic_by: [Complex<f64>; 6],
 }
 
@@ -64,11 +64,6 @@ impl Shot {
     pub(super) fn advance(&mut self, t: f64) {
         self.integrate(t);
         self.variation.advance(t);
-    }
-
-    /// The integral of `q2 exp(-i phase)` over time.
-    pub(super) fn harmonic(&self) -> Complex<f64> {
-        self.harmonic
     }
 
     /// Rates of (q1, q1', q2, q2') and of both parts of the harmonic.
@@ -151,10 +146,8 @@ impl Shooting<'_> {
         harmonic: Complex<f64>,
         by: &Matrix6<f64>,
     ) -> Return {
-        let (scale, harmonic_by) = (
-            &self.scale,
-            [0, 1, 2, 3, 4, 5].map(|n| Complex::new(by[(4, n)], by[(5, n)])),
-        );
+        let scale = &self.scale;
+        let harmonic_by = [0, 1, 2, 3, 4, 5].map(|n| Complex::new(by[(4, n)], by[(5, n)]));
         let (response, response_by) = self.response(drive, turn / drive.omega, harmonic, harmonic_by);
         Return {
             apart,
@@ -180,11 +173,8 @@ impl Shooting<'_> {
         q2_by[4] += q2 / omega;
 
         let p = self.parameters;
-        let (omega0, base, inertia) = (
-            p.natural_frequency(),
-            Complex::new(p.stiffness, p.damping * omega),
-            p.particle_mass * omega * omega,
-        );
+        let (omega0, inertia) = (p.natural_frequency(), p.particle_mass * omega * omega);
+        let base = Complex::new(p.stiffness, p.damping * omega);
         let stiffness = base - p.primary_mass * omega * omega;
         let of_particle = match self.definition.sensor {
             Sensor::V => p.mass_ratio(),

@@ -67,6 +67,7 @@ impl StructureOrbit {
         // Half a period later the particle is at the opposite point.
         let [q2, dq2] = [-FRAC_PI_2 * self.speed / self.omega / d.b, d.speed(self.speed)];
         let impact_velocity = d.speed(self.impact_velocity);
+        let [q1, dq1] = [q2 + 1.0, dq2 - d.r * impact_velocity];
         Orbit {
             g: d.excitation(self.reference * base_per_drive),
             sigma: d.sigma(self.omega),
@@ -75,13 +76,7 @@ impl StructureOrbit {
             gamma: self.phase,
             b: dq2,
             impact_velocity,
-            start: AfterImpact {
-                phase: self.impact_phase,
-                q1: q2 + 1.0,
-                dq1: dq2 - d.r * impact_velocity,
-                q2,
-                dq2,
-            },
+            start: AfterImpact { phase: self.impact_phase, q1, dq1, q2, dq2 },
             multipliers: self.stability.largest_four(),
             stable: self.stability.stable,
             neutral: self.stability.neutral,
