@@ -22,13 +22,8 @@ pub(crate) struct NoisyRig {
 
 impl NoisyRig {
     pub fn new(plant: Plant, noise: f64) -> Self {
-        Self {
-            plant,
-            noise,
-            impacts: LastImpacts::default(),
-            phase: 0.0,
-            random: Rand64::new(1),
-        }
+        let (impacts, random) = (LastImpacts::default(), Rand64::new(1));
+        Self { plant, noise, impacts, phase: 0.0, random }
     }
 }
 

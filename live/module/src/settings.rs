@@ -86,11 +86,8 @@ pub fn changed(mut scene: Scene, values: &Settings) -> Scene {
     if differs(index::GAP) {
         plant.half_width = values[index::GAP] * 1e-3;
     }
-    let (b, difference, cavity) = (
-        plant.half_width,
-        0.01 * values[index::GAP_DIFFERENCE],
-        &mut plant.cavity,
-    );
+    let difference = 0.01 * values[index::GAP_DIFFERENCE];
+    let (b, cavity) = (plant.half_width, &mut plant.cavity);
     if differs(index::GAP_DIFFERENCE) || differs(index::GAP) && cavity.b_plus.or(cavity.b_minus).is_some() {
         let gap = |side: f64| (difference != 0.0).then_some(b * (1.0 + side * difference));
         (cavity.b_plus, cavity.b_minus) = (gap(1.0), gap(-1.0));
