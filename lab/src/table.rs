@@ -30,9 +30,20 @@ impl Table {
         self
     }
 
-    /// Whether it has no row.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
+    /// The text under a line, or nothing without a row.
+    pub fn text_under(&self, line: &str) -> String {
+        match &self.rows[..] {
+            [] => String::new(),
+            _ => format!("{line}\n{}", self.text()),
+        }
+    }
+
+    /// The text, or a line that says why there is no row.
+    pub fn text_or(&self, none: &str) -> String {
+        match &self.rows[..] {
+            [] => format!("  {none}\n"),
+            _ => self.text(),
+        }
     }
 
     /// Columns under their headings, separated by two spaces; words to the left, numbers to the right.

@@ -351,18 +351,17 @@ pub(super) fn run(
 
 /// The motions of recordings.
 fn recorded(stretches: &[Stretch]) -> String {
-    if stretches.is_empty() {
-        return String::new();
-    }
     let rows = stretches.iter().map(|one| {
         let [from, to] = one.seconds.map(|time| format!("{time:.2}"));
         let [low, high] = one.response_m.map(|amplitude| format!("{:.3}", 1e3 * amplitude));
         [from, to, one.motion.to_string(), low, high]
     });
-    Table::new("from, s | to, s | motion | smallest response, mm | largest, mm")
-        .rows(rows)
-        .text()
-        + "\n"
+    let table = Table::new("from, s | to, s | motion | smallest response, mm | largest, mm").rows(rows);
+    if stretches.is_empty() {
+        String::new()
+    } else {
+        table.text() + "\n"
+    }
 }
 
 /// Every hypothesis in a row.

@@ -12,7 +12,8 @@ use vines::helic::{DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable};
 use vines::scene::{Dimensionless, Family, Implausible, Measurand, Names, Override, PAPER, Scene, SceneError};
-use vines::{cells, fmu_rig, table::Table};
+use vines::table::{Table, lines};
+use vines::{cells, fmu_rig};
 
 use super::failure::Failure;
 use super::output::log_warnings;
@@ -163,40 +164,32 @@ impl Endpoint {
             return Ok(String::new());
         };
         let connections = connections(file)?;
-        let [mut same, mut lacks, mut kept] = [Vec::new(), Vec::new(), Vec::new()];
-        let mut rows = Vec::new();
-        for Connection { ours, si, theirs, factor, keeps_its_start, .. } in &connections {
-            if *keeps_its_start {
-                kept.push(ours.as_str());
-            }
-            match theirs {
-                None => lacks.push(ours.as_str()),
-                Some((name, unit))
-                    if name == ours && *factor == 1.0 && unit.as_deref().is_none_or(|unit| unit == *si) =>
-                {
-                    same.push(ours.as_str());
-                }
-                Some((name, unit)) => {
-                    let unit = unit.clone().unwrap_or_else(|| "not declared".into());
-                    rows.push(cells![ours.clone(), si.to_string(), name.clone(), unit, *factor]);
-                }
-            }
-        }
-        let mut text = format!("Variables of the {role} {}\n", file.display());
-        for (what, names) in [
-            ("as on the bench", same),
-            ("not there", lacks),
-            ("not set before the start, by their causality", kept),
-        ] {
-            if !names.is_empty() {
-                text += &format!("  {what}: {}\n", names.join(", "));
-            }
-        }
-        if !rows.is_empty() {
-            let table = Table::new("bench | SI unit | FMU | its unit | SI per unit").rows(rows);
-            text += &format!("\n{}", table.text());
-        }
-        Ok(text + "\n")
+        let is_same = |one: &Connection| {
+            let of_same_unit = |unit: &Option<String>| unit.as_deref().is_none_or(|unit| unit == one.si);
+            let theirs = one.theirs.as_ref();
+            one.factor == 1.0 && theirs.is_some_and(|(name, unit)| *name == one.ours && of_same_unit(unit))
+        };
+        let named = |what: &str, is: &dyn Fn(&Connection) -> bool| {
+            let names: Vec<&str> = connections.iter().filter(|one| is(one)).map(|one| &*one.ours).collect();
+            lines((!names.is_empty()).then(|| format!("  {what}: {}", names.join(", "))))
+        };
+        let rows = connections.iter().filter(|one| !is_same(one)).filter_map(|one| {
+            let (name, unit) = one.theirs.clone()?;
+            let unit = unit.unwrap_or_else(|| "not declared".into());
+            Some(cells![one.ours.clone(), one.si.to_string(), name, unit, one.factor])
+        });
+        let table = Table::new("bench | SI unit | FMU | its unit | SI per unit").rows(rows);
+        Ok([
+            format!("Variables of the {role} {}\n", file.display()),
+            named("as on the bench", &is_same),
+            named("not there", &|one| one.theirs.is_none()),
+            named("not set before the start, by their causality", &|one| {
+                one.keeps_its_start
+            }),
+            table.text_under(""),
+            "\n".into(),
+        ]
+        .concat())
     }
 
     /// The rig of this endpoint.

@@ -404,12 +404,7 @@ fn listed(curves: &[OrbitCurve]) -> String {
     let text = curves.iter().map(|OrbitCurve { points, special, closed }| {
         let special = special.iter().map(|(kind, orbit)| (*kind, orbit.into()));
         let ends = if *closed { "closed" } else { "open" };
-        curve(
-            "Symmetric 1:1",
-            ends,
-            points.iter().map(Place::from).collect(),
-            special.collect(),
-        )
+        curve("Symmetric 1:1", ends, points.iter().map(Place::from), special)
     });
     text.collect()
 }
@@ -420,26 +415,23 @@ fn branch_text(name: &str, branch: &Branch) -> String {
         [BranchEnd::Closed, _] => "closed".into(),
         [first, last] => format!("ends: {}; {}", first.name(), last.name()),
     };
-    let special = branch
-        .special
-        .iter()
-        .map(|special| (special.kind, (&special.motion).into()));
-    curve(
-        name,
-        &ends,
-        branch.points.iter().map(Place::from).collect(),
-        special.collect(),
-    )
+    let special = branch.special.iter().map(|one| (one.kind, (&one.motion).into()));
+    curve(name, &ends, branch.points.iter().map(Place::from), special)
 }
 
 /// A curve: its ends, at most 24 of its orbits, its bifurcations.
-fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, Place)>) -> String {
+fn curve(
+    name: &str,
+    ends: &str,
+    points: impl Iterator<Item = Place>,
+    special: impl Iterator<Item = (Bifurcation, Place)>,
+) -> String {
+    let points: Vec<Place> = points.collect();
     let count = |word: &str| points.iter().filter(|place| place.stability == word).count();
     let [stable, neutral] = ["yes", "neutral"].map(count);
-    let neutral = if neutral > 0 {
-        format!(" and {neutral} neutral")
-    } else {
-        String::new()
+    let neutral = match neutral {
+        0 => "",
+        count => &format!(" and {count} neutral"),
     };
     let (low, high) = range((f64::MAX, f64::MIN), points.iter().map(|place| place.numbers[0]));
     let head = format!(
@@ -451,31 +443,25 @@ fn curve(name: &str, ends: &str, points: Vec<Place>, special: Vec<(Bifurcation, 
         cells![*sigma, *g, *c, gamma.to_degrees(), *b, *largest, *stability]
     });
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
-    let special = special
-        .iter()
-        .map(|(kind, Place { numbers: [sigma, g, c, _, b], .. })| {
-            let (name, g) = (kind.name(), number(*g));
-            format!("  {name} at sigma = {sigma:.6}, G = {g}, C = {c:.6}, B = {b:.6}")
-        });
+    let special = special.map(|(kind, Place { numbers: [sigma, g, c, _, b], .. })| {
+        let (name, g) = (kind.name(), number(g));
+        format!("  {name} at sigma = {sigma:.6}, G = {g}, C = {c:.6}, B = {b:.6}")
+    });
     format!("{head}{}{}\n", table.rows(rows).text(), lines(special))
 }
 
 /// Orbits, a line each.
 fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
-    if orbits.is_empty() {
-        return if scene.g == 0.0 {
-            "  none: without excitation (G = 0) there is no resonance\n".into()
-        } else {
-            "  none between 0.2 and 3 omega0 at this excitation\n".into()
-        };
-    }
+    let none = match scene.g == 0.0 {
+        true => "none: without excitation (G = 0) there is no resonance",
+        false => "none between 0.2 and 3 omega0 at this excitation",
+    };
     let rows = orbits.iter().map(|orbit| {
         let Orbit { sigma, omega, c, b, stable, neutral, .. } = *orbit;
         let (phase, stable) = (orbit.gamma.to_degrees(), stability(stable, neutral));
         let [m1, m2, m3, m4] = orbit.multipliers.map(|modulus| format!("{modulus:.4}"));
         cells![sigma, omega, c, phase, b, m1, m2, m3, m4, stable]
     });
-    Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
-        .rows(rows)
-        .text()
+    let table = Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable");
+    table.rows(rows).text_or(none)
 }

@@ -9,7 +9,7 @@ use vines::cells;
 use vines::orbit::{Bifurcation, StabilityChange, StructureBranch, StructureOrbit};
 use vines::scene::{Scene, Structure};
 use vines::survey::Survey;
-use vines::table::{Cell, Table};
+use vines::table::{Cell, Table, lines};
 
 use super::output::{Results, output, progress_bar, stability, writable};
 use super::{failure::Failure, options::SceneArguments};
@@ -94,10 +94,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
         "frequency, Hz | response, m | C | {command} | largest mult. | stable"
     ))
     .rows(rows);
-    text += &match orbits.is_empty() {
-        true => "  none from 0.2 to 3 times the frequency of the driven mode\n".into(),
-        false => orbits.text(),
-    };
+    text += &orbits.text_or("none from 0.2 to 3 times the frequency of the driven mode");
     text += "\nStable stretches of the backbone, with the driven mode alone and with all modes, and what ends them\n";
     let [alone, all] = [("driven", &survey.facts.alone), ("all", &survey.facts.all)].map(|(modes, branches)| {
         let stretches = branches.iter().flat_map(StructureBranch::stretches);
@@ -147,19 +144,11 @@ fn modes(structure: &Structure, survey: &Survey) -> String {
     if let Some(masses) = structure.mass_loading() {
         text += &format!("  {masses}\n");
     }
-    for (n, mode) in structure
-        .modes
-        .iter()
-        .enumerate()
-        .filter(|(_, mode)| mode.out_of_phase > 0.0)
-    {
-        text += &format!(
-            "  mode {}: {:.1} % of the shape are out of phase and left out\n",
-            n + 1,
-            100.0 * mode.out_of_phase
-        );
-    }
-    text
+    let left_out = (1..).zip(&structure.modes).filter(|(_, mode)| mode.out_of_phase > 0.0);
+    text + &lines(left_out.map(|(n, mode): (usize, _)| {
+        let percent = 100.0 * mode.out_of_phase;
+        format!("  mode {n}: {percent:.1} % of the shape are out of phase and left out")
+    }))
 }
 
 /// The stable backbone behind a shaker as a table; empty without one.
@@ -184,12 +173,8 @@ fn behind_shaker(scene: &Scene, survey: &Survey, b: f64) -> String {
             .map_or("", |structure| structure.excitation.unit())
     ))
     .rows(rows);
-    if behind.is_empty() {
-        return String::new();
-    }
-    format!(
-        "\nThe stable backbone behind the shaker: harmonics of the drive, and distance from the backbone under a pure sine at the same C\n{}",
-        behind.text()
+    behind.text_under(
+        "\nThe stable backbone behind the shaker: harmonics of the drive, and distance from the backbone under a pure sine at the same C",
     )
 }
 
@@ -204,11 +189,7 @@ fn words(kind: Bifurcation) -> &'static str {
 
 /// A stretch of stable orbits, from its smaller to its larger C.
 fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>; 2], b: f64) -> Vec<String> {
-    let modes = if run[0].stability.neutral {
-        format!("{modes}, neutral")
-    } else {
-        modes.into()
-    };
+    let neutral = if run[0].stability.neutral { ", neutral" } else { "" };
     let mut ends = [(&run[0], ends[0]), (&run[run.len() - 1], ends[1])]
         .map(|(orbit, change)| (change.map_or(orbit, |change| &change.orbit), change));
     ends.sort_by(|one, other| one.0.response.total_cmp(&other.0.response));
@@ -226,7 +207,7 @@ fn stretch(modes: &str, run: &[StructureOrbit], ends: [Option<&StabilityChange>;
     };
     let [lower, upper] = ends.map(|(_, change)| reason(change));
     vec![
-        modes,
+        format!("{modes}{neutral}"),
         between(|orbit| orbit.response, b),
         between(|orbit| orbit.omega, TAU),
         drives.join(" to "),

@@ -165,13 +165,14 @@ pub(super) fn identification(result: &Comparison, scene: &Scene) -> String {
     let [hertz, response, drive] = values(at);
     let [(of_response, m), (of_drive, unit)] = channels(scene);
     let measured = format!("Measured: {hertz} Hz, {of_response} {response} {m}, {of_drive} {drive} {unit}\n");
+    let under_drive = match lock.held {
+        true => "",
+        false => " (under a constant drive: the controller does not control the response)",
+    };
     let locked = |motion: String| {
         format!(
-            "Locked after {:.0} periods{}: {motion}, phase error {:.1e} ± {:.1e} degrees\n",
-            lock.periods_to_lock,
-            under_drive(lock),
-            at.phase_error_deg,
-            at.u_phase_deg
+            "Locked after {:.0} periods{under_drive}: {motion}, phase error {:.1e} ± {:.1e} degrees\n",
+            lock.periods_to_lock, at.phase_error_deg, at.u_phase_deg
         )
     };
     if lock.regime_by_impacts.is_none() {
@@ -249,15 +250,6 @@ fn notes(result: &Comparison) -> Vec<String> {
     notes
 }
 
-/// That a constant drive holds the lock, if the controller does not control the response.
-fn under_drive(lock: &Lock) -> &'static str {
-    if lock.held {
-        ""
-    } else {
-        " (under a constant drive: the controller does not control the response)"
-    }
-}
-
 /// Up to which growth of a disturbance the lock is known to be stable.
 fn stability(lock: &Lock) -> String {
     format!(
@@ -277,10 +269,10 @@ fn tone(tone: Tone) -> String {
 
 /// The decay, without a particle.
 fn decay_at_sensor(result: &Comparison) -> String {
-    let (first, last) = match &result.decay[..] {
-        [] => return "Free decay: no points".into(),
-        points => (points[0].point, points[points.len() - 1].point),
+    let Some((first, last)) = result.decay.first().zip(result.decay.last()) else {
+        return "Free decay: no points".into();
     };
+    let (first, last) = (first.point, last.point);
     format!(
         "Free decay: {} points from {:.4e} m at {:.5} Hz down to {:.4e} m at {:.5} Hz",
         result.decay.len(),
@@ -342,7 +334,7 @@ pub(super) fn not_as_asked(result: &Comparison, scene: &Scene) -> impl Iterator<
 }
 
 /// What friction did, as a sentence.
-pub(super) fn friction_text(friction: &Friction) -> String {
+fn friction_text(friction: &Friction) -> String {
     let Friction { sticks_per_period, stuck_time, loss } = friction;
     let sticking = if *sticks_per_period > 0.0 {
         format!("stuck to the floor {sticks_per_period:.3} times, for {stuck_time:.3e} s in all")
@@ -499,18 +491,12 @@ fn drive_harmonics(result: &TrackedComparison, scene: &Scene) -> String {
         Some([level].into_iter().chain(harmonics).chain(clipped).collect::<Vec<_>>())
     });
     let level = match result.reports_impacts() {
-        true => "C".into(),
-        false => format!("{response}, {m}"),
+        true => "C",
+        false => &format!("{response}, {m}"),
     };
-    let table = Table::new(&format!(
-        "{level} | 2, % | 3, % | 4, % | 5, % | 6, % | 7, % | clipped, %"
+    let headings = format!("{level} | 2, % | 3, % | 4, % | 5, % | 6, % | 7, % | clipped, %");
+    let table = Table::new(&headings).rows(rows);
+    table.text_under(&format!(
+        "Harmonics of the {drive}, as measured, over its first, and share of the samples with the amplifier at its limit"
     ))
-    .rows(rows);
-    if table.is_empty() {
-        return String::new();
-    }
-    format!(
-        "Harmonics of the {drive}, as measured, over its first, and share of the samples with the amplifier at its limit\n{}",
-        table.text()
-    )
 }

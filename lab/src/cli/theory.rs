@@ -109,20 +109,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
 fn thresholds(activation: &Activation, sigma: f64) -> String {
     let drive = |g: f64| format!("G = {g:.6}");
     let exact = |g: f64| format!("{} (exact)", drive(g));
-    let Activation {
-        steady_linear,
-        from_rest,
-        from_rest_any_phase,
-        existence,
-        stable,
-        ..
-    } = *activation;
+    let stable = activation.stable.map_or("none at any G".into(), drive);
     let rows = [
-        cells!["steady linear response reaches the wall", drive(steady_linear)],
-        cells!["impacts begin from rest, e = E sin(omega t)", exact(from_rest)],
-        cells!["the same with the best phase of e", exact(from_rest_any_phase)],
-        cells!["some 1:1 motion exists", drive(existence)],
-        cells!["a stable one exists", stable.map_or("none at any G".into(), drive)],
+        [
+            "steady linear response reaches the wall",
+            &drive(activation.steady_linear),
+        ],
+        [
+            "impacts begin from rest, e = E sin(omega t)",
+            &exact(activation.from_rest),
+        ],
+        [
+            "the same with the best phase of e",
+            &exact(activation.from_rest_any_phase),
+        ],
+        ["some 1:1 motion exists", &drive(activation.existence)],
+        ["a stable one exists", &stable],
     ];
     format!("Activation at sigma = {sigma:.6}\n{}", Table::plain().rows(rows).text())
 }
@@ -138,8 +140,5 @@ fn row(branch: BranchSide, numbers: [f64; 3], [impacts, slow_flow]: [bool; 2]) -
 
 fn table(headings: &str, rows: impl Iterator<Item = [Cell; 6]>) -> String {
     let table = Table::new(&format!("{headings} | impacts stable | slow flow stable")).rows(rows);
-    match table.is_empty() {
-        true => "  none at this excitation\n".into(),
-        false => table.text(),
-    }
+    table.text_or("none at this excitation")
 }
