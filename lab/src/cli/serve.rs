@@ -39,10 +39,8 @@ starts. In lock-step, a drive that is not allowed ends the session. See docs/net
 The server listens on this machine only, unless --key or --allow-remote is given. With --key, every frame is authenticated; nothing is
 encrypted. Without it, everyone who can reach the address can drive the rig.";
 
-/// Longest silence in real time, s: about one period of the default scene.
-const SILENCE_PACED: f64 = 0.1;
-/// Longest silence in lock-step, s: the rig does not move in the meantime, and only a peer that has ended is silent for so long.
-const SILENCE_LOCK_STEP: f64 = 5.0;
+/// Longest silence in lock-step, s: nothing moves in the meantime, and only a peer that has ended is silent for so long.
+const SILENCE: f64 = 5.0;
 
 /// Serve the plant to a controller or an experiment across the network
 #[derive(Debug, Args)]
@@ -199,9 +197,10 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
         let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
         return serving.serve_helic(device, step);
     }
+    // The longest silence in real time, s, is about one period of the default scene.
     let (silence, mode, transport): (_, _, fn(_) -> _) = match arguments.lock_step {
-        true => (SILENCE_LOCK_STEP, "in lock-step", Address::Tcp),
-        false => (SILENCE_PACED, "in real time", Address::Udp),
+        true => (SILENCE, "in lock-step", Address::Tcp),
+        false => (0.1, "in real time", Address::Udp),
     };
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },
@@ -232,7 +231,7 @@ pub(super) struct ControllerArguments {
     serving: ServingArguments,
 
     /// Longest silence before the session is shut down, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", default_value_t = SILENCE, value_parser = positive)]
     silence: f64,
 }
 

@@ -28,12 +28,10 @@ use vines::survey::structure_backbone;
 use super::failure::Failure;
 use super::tap::{Tap, no_sample};
 
-/// Samples that wait for the evaluation: more than a minute of the default scene in real time.
-const CHANNEL: usize = 1 << 16;
+/// Samples that wait for the evaluation, and rows that a browser gets that comes late: more than a minute of the default scene in real time.
+const KEPT: usize = 1 << 16;
 /// Rows per natural period that are shown, at most.
 const PER_PERIOD: f64 = 50.0;
-/// Rows that a browser gets that comes late: more than the last minute of the default scene.
-const ROWS_KEPT: usize = 30_000;
 /// Points of the drop-out: several per half-power bandwidth of a light structure.
 const DROP_OUT: usize = 1200;
 /// Time between two evaluations of the samples.
@@ -92,7 +90,7 @@ impl WatchArguments {
             ))
         })?;
         let table = table(title, scene).to_string();
-        let (sender, receiver) = sync_channel(CHANNEL);
+        let (sender, receiver) = sync_channel(KEPT);
         let (view, target) = (View::new(scene.clone(), 0), scene.knowledge().target);
         let thread = thread::spawn(move || serve(&listener, address, &receiver, view, &table));
         super::say(format_args!("Watch it at http://{address}/"));
@@ -199,7 +197,7 @@ impl View {
         if sample.number.is_multiple_of(stride) {
             self.rows.push_back(row);
         }
-        if self.rows.len() > ROWS_KEPT {
+        if self.rows.len() > KEPT {
             self.rows.pop_front();
             self.first += 1;
         }
