@@ -8,26 +8,12 @@ use vines_fmu::{Asked, FmuError, FmuRig};
 
 /// The amplitude of a drive, its signal, and the reference, with their unit.
 fn drive_names(structure: Option<&Structure>) -> [(&'static str, &'static str); 3] {
-    let reference = match structure.map(|structure| structure.excitation) {
-        Some(Excitation::Force) => ("force", "N"),
-        Some(Excitation::Base) if has_shaker(structure) => ("q[table]", "m"),
-        _ => ("base", "m"),
-    };
-    let (names, unit) = match reference {
-        _ if has_shaker(structure) => (["u_amplitude", "u"], "V"),
-        ("force", unit) => (["F_amplitude", "F"], unit),
-        (_, unit) => (["E", "e"], unit),
-    };
-    [(names[0], unit), (names[1], unit), reference]
-}
-
-fn has_shaker(structure: Option<&Structure>) -> bool {
-    structure.is_some_and(|structure| structure.shaker.is_some())
-}
-
-/// The displacement at the sensor of a structure.
-fn at_sensor(structure: &Structure) -> String {
-    format!("q[{}]", structure.points[structure.sensor])
+    match structure.map(|structure| (structure.excitation, structure.shaker.is_some())) {
+        Some((Excitation::Force, true)) => [("u_amplitude", "V"), ("u", "V"), ("force", "N")],
+        Some((Excitation::Force, false)) => [("F_amplitude", "N"), ("F", "N"), ("force", "N")],
+        Some((Excitation::Base, true)) => [("u_amplitude", "V"), ("u", "V"), ("q[table]", "m")],
+        Some((Excitation::Base, false)) | None => [("E", "m"), ("e", "m"), ("base", "m")],
+    }
 }
 
 /// The displacement of a structure's force cell whose mass is compensated.
@@ -42,7 +28,7 @@ pub fn load(path: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
     let structure = scene.structure.as_ref();
     let response = match (structure, definition.sensor) {
         _ if names.mapped("response").is_some() => "response".to_owned(),
-        (Some(structure), _) => at_sensor(structure),
+        (Some(structure), _) => format!("q[{}]", structure.points[structure.sensor]),
         (None, Sensor::V) => "v".to_owned(),
         (None, Sensor::Q1) => "q1".to_owned(),
     };

@@ -138,10 +138,8 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
         Some(Excitation::Force) => "F",
         _ => "E",
     };
-    let (unit, verdict) = (
-        scene.units().reference.symbol,
-        named(&checked.verdict.to_string(), scene),
-    );
+    let unit = scene.units().reference.symbol;
+    let verdict = named(&checked.verdict.to_string(), scene);
     text += &format!("At {symbol} = {:.2e} {unit}: {verdict}\n", checked.amplitude);
     if checked.is_raised() {
         text += &format!(

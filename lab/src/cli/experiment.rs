@@ -220,13 +220,8 @@ impl Session {
         drop(self.controller);
         let timing = self.rig.close();
         let recorded = self.recording.map_or(Ok(None), Recording::finish);
-        let ended = Ended {
-            _orderly: self.orderly,
-            folder: self.folder,
-            kept,
-            recorded,
-            timing,
-        };
+        let (_orderly, folder) = (self.orderly, self.folder);
+        let ended = Ended { _orderly, folder, kept, recorded, timing };
         match result {
             Ok(result) => Ok((result, ended)),
             Err(error) => {

@@ -51,12 +51,8 @@ pub fn component(oscillator: &Component, structure: &Structure, scene: &Scene) -
     // Behind a shaker, the command that makes this drive of a structure that does not move.
     let units = structure.units();
     let amplitude = units.command.of_metres(SINE_SHARE * scene.amplitude);
-    let experiment = lock::sine(
-        (structure, scene),
-        ([signal, input], amplitude),
-        step,
-        parameter_set("plant", parameters),
-    )?;
+    let parameters = parameter_set("plant", parameters);
+    let experiment = lock::sine((structure, scene), ([signal, input], amplitude), step, parameters)?;
     Ok(Component {
         identifier: IDENTIFIER,
         package: oscillator.package,

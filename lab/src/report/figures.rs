@@ -164,12 +164,8 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
         None => name.into(),
     });
     let mut backbone = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)));
-    backbone.curve(
-        theory_backbone(p, top, |point| (point.sigma, point.c)),
-        2.0,
-        THEORY,
-        &first_order,
-    );
+    let theory = theory_backbone(p, top, |point| (point.sigma, point.c));
+    backbone.curve(theory, 2.0, THEORY, &first_order);
     add_exact(&mut backbone, &tracked.exact, EXACT, &orbits);
     let places = || points().map(|point| (point.at.sigma, point.at.c));
     circles(&mut backbone, places(), "tracked");
@@ -182,12 +178,8 @@ pub fn tracked(tracked: &TrackedComparison) -> Figure {
     let (least, most) = range((f64::MAX, f64::MIN), points().map(|point| point.at.g));
     let high = 1.3 * most.max(0.1);
     let mut drive = Panel::new(((0.0, top), amplitude(p)), ((0.0, high), "drive G, base over b ε"));
-    drive.curve(
-        theory_backbone(p, top, |point| (point.c, point.g)),
-        2.0,
-        THEORY,
-        &first_order,
-    );
+    let theory = theory_backbone(p, top, |point| (point.c, point.g));
+    drive.curve(theory, 2.0, THEORY, &first_order);
     let exact = tracked.exact.places().iter().map(|place| (place[0], place[2]));
     drive.add(Shape::Line(1.6), exact, EXACT, &orbits);
     let places = || points().map(|point| (point.at.c, point.at.g));
