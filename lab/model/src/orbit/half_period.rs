@@ -12,7 +12,7 @@ use lovines::oscillator::Oscillator;
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, RowVector2, Vector2};
 
 use super::flight::Flight;
-use super::multipliers::{self, Impact};
+use super::multipliers::{self, Impact, field};
 use super::periodic::ORBIT_ERROR;
 use super::return_map::Stability;
 use super::symmetric::{Particle, SymmetricMotion, alternating};
@@ -134,10 +134,8 @@ fn impact(parts: &[(Section, Vector2<f64>)], motion: &SymmetricMotion) -> Impact
 fn map(flows: &[(Section, Matrix2<f64>)], Impact { mu, kappa }: Impact) -> DMatrix<f64> {
     let mut map = DMatrix::zeros(2 * flows.len(), 2 * flows.len());
     for (column, (section, flow)) in flows.iter().enumerate() {
-        let [a, b] = section.cavity;
-        let by_w = RowVector2::new(a, b) * flow;
-        let Oscillator { delta, omega0_squared, .. } = section.oscillator;
-        let by_dw = RowVector2::new(-omega0_squared * b, a - 2.0 * delta * b) * flow;
+        let cavity = RowVector2::from(section.cavity);
+        let (by_w, by_dw) = (cavity * flow, cavity * field(section) * flow);
         for (row, (section, _)) in flows.iter().enumerate() {
             let kick = Vector2::from(section.kick);
             // An early impact also acts on the vector field of the kick.

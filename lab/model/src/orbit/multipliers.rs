@@ -110,7 +110,7 @@ fn in_pairs(zeros: &[Complex<f64>]) -> impl Iterator<Item = Complex<f64>> {
 }
 
 /// The matrix of the vector field of a section.
-fn field(section: &Section) -> Matrix2<f64> {
+pub(super) fn field(section: &Section) -> Matrix2<f64> {
     let oscillator = &section.oscillator;
     Matrix2::new(0.0, 1.0, -oscillator.omega0_squared, -2.0 * oscillator.delta)
 }
