@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 use nalgebra::Complex;
 
 use super::slow_flow::{BackbonePoint, BranchSide, SlowFlow};
-use crate::numerics::{equally_spaced, secant};
+use crate::numerics::{MOST_STEPS, equally_spaced, secant};
 use crate::{Dimensionless, Sensor};
 
 /// All solutions of first-order theory that are resonant by the scene's definition, at its G, by increasing B. `C` is the amplitude that
@@ -46,9 +46,6 @@ pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
 pub fn reading(scene: &Dimensionless, b: f64) -> f64 {
     Reading::of(scene).seen(b).norm()
 }
-
-/// Rounds of a fixed-point iteration.
-const MOST_ITERATIONS: usize = 12;
 
 struct Reading<'a> {
     scene: &'a Dimensionless,
@@ -90,8 +87,8 @@ impl<'a> Reading<'a> {
     /// The speed on the right branch at which the sensor reads the amplitude `c`.
     fn speed_at_level(&self, c: f64) -> Option<f64> {
         let mut amplitude = c;
-        // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
-        for _ in 0..MOST_ITERATIONS {
+        // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much, and near the fold less.
+        for _ in 0..MOST_STEPS {
             let b = self.flow.manifold.b(amplitude, BranchSide::Right)?;
             amplitude = c / self.seen(b).norm();
         }
