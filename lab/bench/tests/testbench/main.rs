@@ -15,8 +15,9 @@ mod units;
 
 use phase_lock::Config;
 use vines_bench::backbone::{Tracked, track};
+use vines_bench::comparison::ExactCurve;
 use vines_bench::experiment::{ExperimentError, run};
-use vines_bench::identification::{Identification, IdentificationError, identify};
+use vines_bench::identification::{Identification, IdentificationError, ResonancePoint, identify};
 use vines_bench::plan::Plan;
 use vines_bench::record::Record;
 use vines_bench::rig::{
@@ -41,6 +42,14 @@ fn preset(name: &str, settings: &[&str]) -> Result<Scene, SceneError> {
     let file = format!("{}/../../{folder}/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let settings: Vec<Override> = settings.iter().map(|one| one.parse().unwrap()).collect();
     Scene::load(Some(file.as_ref()), &settings)
+}
+
+/// Difference of a point from the exact curve of a scene with one oscillator: in sigma and in G at its response, and from the nearest point.
+fn off_curve(scene: &Scene, at: &ResonancePoint) -> [f64; 3] {
+    let exact = ExactCurve::of(&scene.dimensionless());
+    let distance = exact.distance(at.c, at.sigma, at.g).unwrap();
+    let [sigma, g] = [distance.sigma, distance.g].map(|off| off.map_or(f64::NAN, f64::abs));
+    [sigma, g, distance.nearest]
 }
 
 /// A text with replacements of its parts: `text -> replacement ;; text -> replacement`.

@@ -25,8 +25,14 @@ use vines_model::orbit::phase_resonant;
 use super::common::{self, crossings, noisy, rig_with_stable_orbit, uniform};
 use super::structures::BEAM;
 use super::{
-    Altered, changed, checked, dimensionless, identified, paper, preset, record, record_of, tracked, tracked_of,
+    Altered, changed, checked, dimensionless, identified, off_curve, paper, preset, record, record_of, tracked,
+    tracked_of,
 };
+
+/// The default scene with these settings, which spaces separate.
+fn spaced(settings: &str) -> Scene {
+    paper(&settings.split_whitespace().collect::<Vec<_>>())
+}
 
 /// The lock of an experiment with the plant of a scene.
 fn lock(scene: &Scene) -> Lock {
@@ -63,17 +69,10 @@ fn noise_is_that_of_its_seed() {
 fn noise_of(scene: &Scene) -> Vec<[f64; 2]> {
     let [mut noisy, mut clean] = [Simulated::of(scene), Simulated::without_chain(scene)].map(Result::unwrap);
     let omega = scene.dimensionless().omega0;
+    let command = scene.units().command;
     let stretch = |share: f64| {
-        let drive = Drive {
-            omega,
-            amplitude: scene
-                .knowledge()
-                .target
-                .units
-                .command
-                .of_metres(share * scene.amplitude),
-            displacement: 0.0,
-        };
+        let amplitude = command.of_metres(share * scene.amplitude);
+        let drive = Drive { omega, amplitude, displacement: 0.0 };
         let mut squares = [0.0; 2];
         for _ in 0..SAMPLES {
             let [one, other] = [&mut noisy, &mut clean].map(|rig| {
@@ -112,10 +111,8 @@ fn the_noise_of_a_sensor_is_the_same_at_rest_at_a_hundredth_of_the_drive_at_the_
             "chain.snr=40".into(),
         ];
         let found = noise_of(&paper(&settings.each_ref().map(String::as_str)));
-        are(
-            &found,
-            [4e-3, drive].map(|level| 7.071e-3 * level * omega0.powi(order as i32)),
-        );
+        let rate = omega0.powi(order as i32);
+        are(&found, [4e-3, drive].map(|level| 7.071e-3 * level * rate));
     }
     // A sensor of the centre of mass, and a force, which is read as the base that makes it at omega0.
     are(&noise_of(&paper(&["chain.snr=60"])), [2.828e-6, 7.071e-4 * drive]);
@@ -137,14 +134,10 @@ fn keys_in_si_units_replace_the_noise_of_their_channel_whatever_it_measures() {
     let noisy = |settings: &[&str]| noise_of(&paper(settings));
     // Without the other channel, or with its decibels.
     are(&noisy(&["chain.response_noise=2e-5"]), [2e-5, 0.0]);
-    are(
-        &noisy(&["chain.snr=40", "chain.reference_noise=3e-6"]),
-        [2.828e-5, 3e-6],
-    );
-    are(
-        &noisy(&["chain.snr=40", "chain.response_noise=0"]),
-        [0.0, 7.071e-3 * 9.246_126e-5],
-    );
+    let both = noisy(&["chain.snr=40", "chain.reference_noise=3e-6"]);
+    are(&both, [2.828e-5, 3e-6]);
+    let silent = noisy(&["chain.snr=40", "chain.response_noise=0"]);
+    are(&silent, [0.0, 7.071e-3 * 9.246_126e-5]);
     let rates = [
         "resonance.sensor=q1",
         "resonance.sensor_quantity=acceleration",
@@ -170,11 +163,8 @@ fn at(settings: &str) -> Result<ResonancePoint, ExperimentError> {
 
 #[test]
 fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_switch_the_drive_off() {
-    let [ideal, real] = [
-        "",
-        "chain.adc_bits=16 chain.dac_bits=16 chain.hold=true chain.delay=1 chain.reference=false",
-    ]
-    .map(|settings| at(settings).unwrap());
+    let real = "chain.adc_bits=16 chain.dac_bits=16 chain.hold=true chain.delay=1 chain.reference=false";
+    let [ideal, real] = ["", real].map(|settings| at(settings).unwrap());
     assert!((real.sigma - ideal.sigma).abs() <= 2e-3 && (real.c - ideal.c).abs() <= 2e-3);
     // The response is within one step of this converter.
     let coarse = at("chain.adc_bits=6").unwrap_err();
@@ -182,45 +172,29 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most_and_six_bits_s
     // The drive stays within the range of the converter that reads it.
     let damped = at("plant.lambda=4.5 start.dq2=0 excitation.G=2 chain.adc_bits=12").unwrap_err();
     assert!(matches!(damped, ExperimentError::NotReached { .. }), "{damped}");
-    assert!(
-        damped
-            .to_string()
-            .contains("none was symmetric and nonlinear. A particle at rest needs"),
-        "{damped}"
-    );
+    let words = "none was symmetric and nonlinear. A particle at rest needs";
+    assert!(damped.to_string().contains(words), "{damped}");
     // From the middle, impacts would begin at G = 4.5; a particle that moves needs less.
     let moving = at("plant.lambda=4.5 start.dq2=0.8 excitation.G=2 chain.adc_bits=12").unwrap();
-    let exact = ExactCurve::of(&dimensionless("plant.lambda=4.5").dimensionless());
-    let distance = exact.distance(moving.c, moving.sigma, moving.g).unwrap();
-    assert!(
-        (moving.g - 2.0).abs() < 0.02 && distance.nearest < 1e-4,
-        "{distance:?}: {moving:?}"
-    );
+    let [.., nearest] = off_curve(&dimensionless("plant.lambda=4.5"), &moving);
+    assert!((moving.g - 2.0).abs() < 0.02 && nearest < 1e-4, "{nearest}: {moving:?}");
     // A delay that nobody compensates is seen, and one common to both sensors is not.
     let late = at("chain.delay=1 chain.reference=false phase_lock.delay=0").unwrap();
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
-    let exact = ExactCurve::of(&dimensionless("").dimensionless());
     let both = at("chain.delay=1").unwrap();
-    assert!(
-        exact.distance(both.c, both.sigma, both.g).unwrap().nearest < 1e-5,
-        "{both:?}"
-    );
+    assert!(off_curve(&dimensionless(""), &both)[2] < 1e-5, "{both:?}");
 }
 
 #[test]
 fn a_delay_of_more_than_a_period_that_the_controller_knows_does_not_keep_it_from_the_lock() {
-    let exact = ExactCurve::of(&dimensionless("").dimensionless());
     for settings in [
         "chain.delay=120",
         "chain.delay=120 chain.reference=false",
         "chain.delay=250 controller.bandwidth=0.06",
     ] {
         let late = at(settings).unwrap();
-        let distance = exact.distance(late.c, late.sigma, late.g).unwrap();
-        assert!(
-            distance.sigma.unwrap().abs() < 3.0 * late.u_sigma,
-            "{settings}: {late:?}"
-        );
+        let [sigma, ..] = off_curve(&dimensionless(""), &late);
+        assert!(sigma < 3.0 * late.u_sigma, "{settings}: {late:?}");
     }
 }
 
@@ -253,21 +227,11 @@ fn the_gains_of_an_anti_alias_filter_and_of_a_held_base_are_corrected() {
 
 #[test]
 fn an_asymmetric_motion_is_none_of_noise_whatever_the_sensor_measures() {
-    let scene = paper(&[
-        "plant.m=0.066271",
-        "plant.c=8.068",
-        "plant.r=0.723",
-        "resonance.sensor=q1",
-        "resonance.reference_quantity=velocity",
-        "backbone.C_from=0.75",
-        "backbone.points=1",
-    ]);
-    let level = tracked_of(&scene).points[0];
-    assert_eq!(
-        [Some(level.regime), level.regime_by_impacts],
-        [Some(Regime::Asymmetric); 2]
-    );
-    assert!(!level.settled);
+    let rig = "plant.m=0.066271 plant.c=8.068 plant.r=0.723 backbone.C_from=0.75 backbone.points=1";
+    let sensors = "resonance.sensor=q1 resonance.reference_quantity=velocity";
+    let level = tracked_of(&spaced(&format!("{rig} {sensors}"))).points[0];
+    let regimes = [Some(level.regime), level.regime_by_impacts];
+    assert!(regimes == [Some(Regime::Asymmetric); 2] && !level.settled, "{level:?}");
 }
 
 #[test]
@@ -276,27 +240,22 @@ fn a_point_without_a_base_sensor_is_as_right_as_one_with_it() {
     for reference in ["chain.reference=true", "chain.reference=false"] {
         let scene = paper(&[&rig[..], &[reference]].concat());
         let at = tracked_of(&scene).points[0].at;
-        let exact = ExactCurve::of(&scene.dimensionless());
-        let off = exact.distance(at.c, at.sigma, at.g).unwrap().sigma.unwrap();
-        assert!(off.abs() < 3.0 * at.u_sigma, "{reference}: {at:?}, {off}");
+        let [sigma, ..] = off_curve(&scene, &at);
+        assert!(sigma < 3.0 * at.u_sigma, "{reference}: {at:?}, {sigma}");
     }
 }
 
 #[test]
 fn neither_noise_behind_a_filter_nor_an_accelerometer_of_a_base_whose_drive_changes_keeps_the_loop_from_settling() {
-    let curve = ExactCurve::of(&dimensionless("").dimensionless());
     for settings in [
         "chain.filter=10 chain.snr=40",
         "chain.filter=4 chain.snr=40",
         "chain.filter=10 chain.snr=40 chain.reference=false",
     ] {
         let filtered = at(settings).unwrap();
-        let distance = curve.distance(filtered.c, filtered.sigma, filtered.g).unwrap();
-        let (sigma, g) = (distance.sigma.unwrap().abs(), distance.g.unwrap().abs());
-        assert!(
-            sigma < 3.0 * filtered.u_sigma && g < 3.0 * filtered.u_g,
-            "{settings}: {distance:?}, {filtered:?}"
-        );
+        let [sigma, g, _] = off_curve(&dimensionless(""), &filtered);
+        let is_near = sigma < 3.0 * filtered.u_sigma && g < 3.0 * filtered.u_g;
+        assert!(is_near, "{settings}: {sigma} {g}, {filtered:?}");
     }
     for settings in [
         "chain.filter=10 chain.snr=40 backbone.points=2 backbone.C_to=0.4",
@@ -304,12 +263,8 @@ fn neither_noise_behind_a_filter_nor_an_accelerometer_of_a_base_whose_drive_chan
         "plant.m=0.05061 plant.c=2.711 plant.r=0.706 excitation.G=1.365 resonance.sensor=q1 resonance.sensor_quantity=velocity \
          resonance.reference_quantity=acceleration controller.samples_per_period=400 backbone.C_from=0.56 backbone.points=1",
     ] {
-        let levels = tracked_of(&paper(&settings.split_whitespace().collect::<Vec<_>>()));
-        assert!(
-            levels.points.iter().all(|point| point.settled),
-            "{settings}: {:?}",
-            levels.points
-        );
+        let levels = tracked_of(&spaced(settings)).points;
+        assert!(levels.iter().all(|point| point.settled), "{settings}: {levels:?}");
     }
 }
 
@@ -392,10 +347,9 @@ fn falsified(settings: &[&str], wrong: &[&str]) -> (SensorsOnly, Scene) {
     let truth = paper(&[&IN_METRES[..], settings].concat());
     let rig = SensorsOnly::around(Simulated::of(&truth).unwrap());
     // The levels 6 and 3 mm over the half-width that the scene states.
-    let levels = if wrong.contains(&"plant.b=0.012") {
-        ["backbone.C_from=0.5", "backbone.C_to=0.25"]
-    } else {
-        ["backbone.C_from=0.6", "backbone.C_to=0.3"]
+    let levels = match wrong.contains(&"plant.b=0.012") {
+        true => ["backbone.C_from=0.5", "backbone.C_to=0.25"],
+        false => ["backbone.C_from=0.6", "backbone.C_to=0.3"],
     };
     (rig, paper(&[&IN_METRES[..], &levels, settings, wrong].concat()))
 }
@@ -436,6 +390,7 @@ const FALSE: [&[&str]; 4] = [
 fn measurements_in_si_units_have_the_same_bits_whatever_the_scene_says_of_the_particle() {
     // A mass that moves at the start: the first motion that is held is symmetric, so that no search is needed.
     let moving = "start.dq1=-0.2";
+    let accelerometer = ["resonance.sensor=q1", "resonance.sensor_quantity=acceleration"];
     for (settings, wrong) in [
         (&[moving][..], &FALSE[..]),
         (&[moving, "chain.snr=40"], &FALSE),
@@ -443,10 +398,7 @@ fn measurements_in_si_units_have_the_same_bits_whatever_the_scene_says_of_the_pa
         // Where a symmetric motion is searched for, b is the scale of the search; where impacts are, m/M is the scale of their evidence.
         (&[], &FALSE[..2]),
         (&["start.dq2=0"], &FALSE[..1]),
-        (
-            &["resonance.sensor=q1", "resonance.sensor_quantity=acceleration"],
-            &FALSE[..1],
-        ),
+        (&accelerometer, &FALSE[..1]),
     ] {
         let expected = measured(settings, &[]);
         for wrong in wrong {
@@ -481,11 +433,8 @@ fn friction_from_rest_is_never_called_a_motion_with_impacts() {
         let plan = client.plan_on(client.knowledge().measured(linear.response));
         let found = common::tracked(&mut *rig, &plan, 20.0).unwrap();
         for point in common::kept(&found) {
-            assert_ne!(
-                point.regime_by_impacts,
-                Some(Regime::NoImpacts),
-                "mu = {mu}: {linear:?} {point:?}"
-            );
+            let is_called = point.regime_by_impacts == Some(Regime::NoImpacts);
+            assert!(!is_called, "mu = {mu}: {linear:?} {point:?}");
         }
     }
 }
@@ -494,26 +443,16 @@ fn friction_from_rest_is_never_called_a_motion_with_impacts() {
 fn a_response_that_creeps_below_the_fold_behind_noise_is_a_point_of_the_backbone() {
     // Of the exact backbone, no motion between C = 0.3 and 0.6 needs so little drive: the response falls from one to the other for 800 periods. On the
     // second rig it falls by 1e-5 a period at C = 0.371, where the least drive is G = 0.9581, on its way to C = 0.207.
-    let fast = ["0.00408", "0.3234", "0.4172", "0.9218", "20"];
-    let slow = [
-        "0.003955700581273307",
-        "0.6797041112321551",
-        "0.5164337547784803",
-        "0.9572666777756323",
-        "40",
-    ];
-    for (numbers, seed) in [(fast, 1), (fast, 2), (fast, 3), (slow, 28)] {
-        let names = ["plant.epsilon", "plant.lambda", "plant.r", "excitation.G", "chain.snr"];
-        let numbers = names
-            .iter()
-            .zip(numbers)
-            .map(|(name, value)| format!("{name}={value} "));
-        let rest = "start.dq2=0 controller.omega_min=0.8 controller.omega_max=1.2 record.decay_periods=3";
-        let scene = dimensionless(&format!("{}{rest} chain.seed={seed}", numbers.collect::<String>()));
+    let fast = "plant.epsilon=0.00408 plant.lambda=0.3234 plant.r=0.4172 excitation.G=0.9218 chain.snr=20";
+    let slow = "plant.epsilon=0.003955700581273307 plant.lambda=0.6797041112321551 plant.r=0.5164337547784803 \
+                excitation.G=0.9572666777756323 chain.snr=40";
+    let rest = "start.dq2=0 controller.omega_min=0.8 controller.omega_max=1.2 record.decay_periods=3";
+    for (rig, seed) in [(fast, 1), (fast, 2), (fast, 3), (slow, 28)] {
+        let scene = dimensionless(&format!("{rig} {rest} chain.seed={seed}"));
         let at = lock(&scene).at;
-        let distance = ExactCurve::of(&scene.dimensionless()).distance(at.c, at.sigma, at.g);
+        let [.., nearest] = off_curve(&scene, &at);
         let u = at.u_c.max(at.u_sigma).max(at.u_g);
-        assert!(distance.unwrap().nearest <= 2.0 * u, "{distance:?}: {at:?}");
+        assert!(nearest <= 2.0 * u, "{nearest}: {at:?}");
     }
 }
 
@@ -554,14 +493,10 @@ fn difficult_rigs_lock_from_rest_on_their_symmetric_motion() {
         assert!((lock.at.c - c).abs() < 2e-3, "{lock:?}");
     }
     // Beside its fold a modulation decays over 540 periods, and a level waits for 150.
-    let modulated =
-        "[plant]\nepsilon = 0.046079366\nlambda = 0.68301824\nr = 0.27802309\n[excitation]\nG = 0.89886111\n";
-    let scene = common::scene(modulated, &[""; 0]).unwrap();
-    let refused = record(&mut *Simulated::of(&scene).unwrap(), &scene).map(|_| ());
-    assert!(
-        matches!(refused, Err(ExperimentError::NotReached { .. })),
-        "{refused:?}"
-    );
+    let plant = "[plant]\nepsilon = 0.046079366\nlambda = 0.68301824\nr = 0.27802309\n";
+    let scene = common::scene(&format!("{plant}[excitation]\nG = 0.89886111\n"), &[""; 0]).unwrap();
+    let refused = record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap_err();
+    assert!(matches!(refused, ExperimentError::NotReached { .. }), "{refused}");
 }
 
 #[test]
@@ -571,11 +506,7 @@ fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
         assert_eq!(scene.start, State::default(), "{name} does not start from rest");
         let record = record_of(&scene);
         let lock = identify(&record, &scene.plan()).unwrap().lock;
-        let expected = if name == "vertical" {
-            Regime::Asymmetric
-        } else {
-            Regime::Symmetric
-        };
+        let expected = [Regime::Symmetric, Regime::Asymmetric][usize::from(name == "vertical")];
         assert_eq!(lock.regime, expected);
         assert_eq!(lock.friction.is_some(), name == "rough");
         // The stable exact orbit of an ideal cavity at the measured drive.
@@ -613,10 +544,8 @@ fn presets_of_a_real_cavity_lock_from_rest_as_their_effects_say() {
 fn rig<'a>(scene: &Scene, tones: &'a [(f64, f64)]) -> Altered<'a> {
     let (step, mut time) = (scene.sample_time(), 0.0);
     let shown = Altered::reading(scene, move |sensors: Sensors| {
-        let tones = tones
-            .iter()
-            .map(|(hertz, size)| size * (TAU * hertz * time + 1.0).sin());
-        let response = sensors.response + tones.sum::<f64>();
+        let value = |(hertz, size): &(f64, f64)| size * (TAU * hertz * time + 1.0).sin();
+        let response = sensors.response + tones.iter().map(value).sum::<f64>();
         time += step;
         Sensors { response, ..sensors }
     });
@@ -654,10 +583,8 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
         let [clean, humming] = [&[][..], &in_metres].map(|tones| points(&mut rig(&scene, tones), &scene));
         for (clean, point) in clean.iter().zip(humming) {
             let is_known = |one: &LevelPoint| matches!(one.regime, Regime::Symmetric | Regime::Unresolved);
-            assert!(
-                point.settled && is_known(&point) && is_known(clean),
-                "{clean:?}, {point:?}"
-            );
+            let are_known = is_known(&point) && is_known(clean);
+            assert!(point.settled && are_known, "{clean:?}, {point:?}");
             let tone = point.tone.unwrap();
             assert!((tone.hertz - hertz).abs() < 0.01);
             assert!((tone.share / (share * 0.55 / point.at.c) - 1.0).abs() < 0.02);
@@ -667,15 +594,15 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
             let record = record(&mut rig(&scene, tones), &scene).unwrap();
             identify(&record, &checked(&scene)).unwrap().lock
         });
-        let text = humming.tone.unwrap().to_string();
-        assert!(
-            text.starts_with(&format!("a foreign tone of {hertz:.1} Hz, ")),
-            "{text}"
+        let (text, expected) = (
+            humming.tone.unwrap().to_string(),
+            format!("a foreign tone of {hertz:.1} Hz, "),
         );
+        assert!(text.starts_with(&expected), "{text}");
         // Both are on one curve, whatever their drives are.
         let exact = ExactCurve::of(&scene.dimensionless());
-        let [of_hum, of_clean] =
-            [humming.at, clean.at].map(|at| exact.distance(at.c, at.sigma, at.g).unwrap().sigma.unwrap());
+        let off = |at: &ResonancePoint| exact.distance(at.c, at.sigma, at.g).unwrap();
+        let [of_hum, of_clean] = [&humming.at, &clean.at].map(|at| off(at).sigma.unwrap());
         let u = humming.at.u_sigma.hypot(clean.at.u_sigma);
         assert!((of_hum - of_clean).abs() < 3.0 * u && clean.tone.is_none());
     }
@@ -685,19 +612,14 @@ fn through_mains_hum_and_ripple_a_backbone_is_tracked_and_a_lock_identified_whic
 fn beside_symmetry_breaking_a_lock_is_asymmetric_or_says_that_its_growth_would_not_have_shown() {
     // Orbits are stable up to G = 1.414. Here the symmetry is lost so slowly that phase and frequency are steady before.
     let scene = paper(&["start.dq2=0", "excitation.G=1.424"]);
-    let found = identified(&scene);
-    match found {
+    match identified(&scene) {
         Err(IdentificationError::Regime { regime: Regime::Asymmetric, .. }) => {}
         Ok(found) => {
             let at = Dimensionless { g: found.lock.at.g, ..scene.dimensionless() };
-            let growth = phase_resonant(&at)
-                .into_iter()
-                .map(|orbit| orbit.multipliers[3].powi(2) - 1.0);
-            assert!(
-                growth.fold(f64::INFINITY, f64::min) < found.lock.unseen_growth,
-                "{:?}",
-                found.lock
-            );
+            let orbits = phase_resonant(&at).into_iter();
+            let growth = orbits.map(|orbit| orbit.multipliers[3].powi(2) - 1.0);
+            let least = growth.fold(f64::INFINITY, f64::min);
+            assert!(least < found.lock.unseen_growth, "{:?}", found.lock);
         }
         Err(error) => panic!("{error}"),
     }
@@ -705,30 +627,17 @@ fn beside_symmetry_breaking_a_lock_is_asymmetric_or_says_that_its_growth_would_n
 
 #[test]
 fn a_search_without_a_lock_says_what_it_found_and_what_to_do() {
+    let [linear, nearest] = ["none was symmetric and nonlinear", "had the nearest drive, "];
+    let late = "the time was over (phase_lock.acquire_timeout)";
     for (settings, parts) in [
+        ("phase_lock.acquire_timeout=500", [linear, late]),
+        ("phase_lock.acquire_timeout=1385", [nearest, late]),
         (
-            "start.dq2=0 phase_lock.acquire_timeout=500",
-            [
-                "none was symmetric and nonlinear",
-                "the time was over (phase_lock.acquire_timeout)",
-            ],
-        ),
-        (
-            "start.dq2=0 phase_lock.acquire_timeout=1385",
-            [
-                "had the nearest drive, ",
-                "the time was over (phase_lock.acquire_timeout)",
-            ],
-        ),
-        (
-            "start.dq2=0 excitation.G=0.5",
-            [
-                "had the nearest drive, ",
-                "beyond it the motion was lost. `vines backbone`",
-            ],
+            "excitation.G=0.5",
+            [nearest, "beyond it the motion was lost. `vines backbone`"],
         ),
     ] {
-        let error = at(settings).unwrap_err().to_string();
+        let error = at(&format!("start.dq2=0 {settings}")).unwrap_err().to_string();
         assert!(parts.iter().all(|part| error.contains(part)), "{settings}: {error}");
     }
 }
@@ -870,7 +779,7 @@ fn single_precision_keeps_the_lock_within_1e_4_in_sigma() {
         ("plant.m=0.004 plant.c=0.316", 30000.0),
         ("plant.r=0.8", 2000.0),
     ] {
-        let scene = paper(&settings.split_whitespace().collect::<Vec<_>>());
+        let scene = spaced(settings);
         let config = scene.controller_config();
         let (expected, locks) = detuning(&scene, settle, &mut BuiltIn::new(&config).unwrap());
         let controller = rounded(&config).build().unwrap();
