@@ -41,6 +41,8 @@ const CURRENT: &str = "amplifier = \"voltage\" -> amplifier = \"current\"";
 /// Of the cantilever.
 const COMPENSATED: &str = "[shaker] -> [shaker]\ncompensated_mass = 0.02";
 
+const ALIASING: &str = "[start] -> [chain]\nfilter = 4.0\n[controller]\nsamples_per_period = 120.33\n[start]";
+
 /// Presets with changes, and the most periods to the lock.
 const LOCKS: [(usize, &str, f64); 11] = [
     (0, "", f64::INFINITY),
@@ -50,11 +52,7 @@ const LOCKS: [(usize, &str, f64); 11] = [
     // A table whose own resonance is near.
     (2, CURRENT, f64::INFINITY),
     // Samples of 120.33 in a period see the edges of the force at another phase in each third one: they alias to no motion of several periods.
-    (
-        1,
-        "[start] -> [chain]\nfilter = 4.0\n[controller]\nsamples_per_period = 120.33\n[start]",
-        f64::INFINITY,
-    ),
+    (1, ALIASING, f64::INFINITY),
     // A coil that damps the decay is no dead sensor.
     (1, "resistance = 2.0 -> resistance = 0.5", f64::INFINITY),
     // The noise of the readings is in the command, and through it in the force, of which 1.8 % is left: the motion moves more than the readings' noise.
@@ -68,10 +66,8 @@ const LOCKS: [(usize, &str, f64); 11] = [
 fn rigs_lock_on_the_exact_orbit_with_their_shaker_also_through_noise_and_edges_that_alias() {
     LOCKS.par_iter().for_each(|(n, changes, most)| {
         let (nearest, periods) = distance_of_lock(&preset(*n, changes).unwrap());
-        assert!(
-            nearest < 3.0 && periods < *most,
-            "preset {n}, {changes}: {nearest} u, {periods} periods"
-        );
+        let found = format!("{nearest} u, {periods} periods");
+        assert!(nearest < 3.0 && periods < *most, "preset {n}, {changes}: {found}");
     });
 }
 
@@ -105,22 +101,11 @@ fn a_lock_behind_a_shaker_states_its_force_in_newtons_and_its_command_in_volts()
     assert!(lock.at.e_m.is_none() && lock.at.u_e_m.is_none());
     // The exact orbits of structure and shaker state both.
     let orbits = Survey::of(&scene, &|| ()).unwrap().orbits;
-    let apart = |orbit: &StructureOrbit| (orbit.omega / (TAU * lock.at.f_hz) - 1.0).abs();
-    let exact = orbits
-        .iter()
-        .min_by(|one, other| apart(one).total_cmp(&apart(other)))
-        .unwrap();
-    assert!(
-        (force / exact.reference - 1.0).abs() < 2e-3,
-        "{force} N, {}",
-        exact.reference
-    );
-    assert!(
-        (lock.command_v.unwrap() / exact.drive - 1.0).abs() < 1e-2,
-        "{:?} V, {}",
-        lock.command_v,
-        exact.drive
-    );
+    let apart = |orbit: &&StructureOrbit| (orbit.omega / (TAU * lock.at.f_hz) - 1.0).abs();
+    let nearest = orbits.iter().min_by(|one, other| apart(one).total_cmp(&apart(other)));
+    let (exact, volts) = (nearest.unwrap(), lock.command_v.unwrap());
+    assert!((force / exact.reference - 1.0).abs() < 2e-3, "{force} N, {exact:?}");
+    assert!((volts / exact.drive - 1.0).abs() < 1e-2, "{volts} V, {exact:?}");
     // On a base there are no newtons, and without a shaker no volts.
     let table = identified(&preset(2, "").unwrap()).unwrap().lock;
     assert!(table.at.f_n.is_none() && table.command_v.unwrap() > 0.0);
@@ -134,12 +119,8 @@ fn tracked_points_behind_a_shaker_belong_to_their_scene_and_not_to_a_wrong_one()
     for n in [1, 2] {
         let levels = "[start] -> [backbone]\npoints = 8\nC_from = 0.6\nC_to = 0.25\n\n[start]";
         let scene = preset(n, levels).unwrap();
-        let found = tracked_of(&scene);
-        let points: Vec<_> = found
-            .points
-            .iter()
-            .map(|point| point.at.measured(&scene.units()))
-            .collect();
+        let points = tracked_of(&scene).points.into_iter();
+        let points: Vec<_> = points.map(|point| point.at.measured(&scene.units())).collect();
         assert!(contradiction(&scene, points.clone()).is_none(), "preset {n}");
         let mut wrong = scene.clone();
         wrong.plant.restitution = 0.6;
@@ -203,11 +184,8 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
     let structure = scene.structure.as_ref().unwrap();
     let rows = &structure.shaker.as_ref().unwrap().rows;
     let orbits = scene.structure_orbits().unwrap();
-    let orbit = orbits
-        .at_phase_resonance(0.99 * TAU)
-        .into_iter()
-        .find(|orbit| orbit.stability.stable)
-        .unwrap();
+    let mut found = orbits.at_phase_resonance(0.99 * TAU).into_iter();
+    let orbit = found.find(|orbit| orbit.stability.stable).unwrap();
     let (mut plant, drive) = on_orbit(&scene, &orbit);
     let count = 20_000;
     let mut force = Vec::new();
@@ -220,16 +198,8 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
         force.iter().enumerate().map(turned).sum::<Complex<f64>>().norm()
     };
     let beside = |samples: f64| harmonic(samples - 1.0) / harmonic(1.0) / scene.backbone.precision;
-    assert!(
-        samples > 200.0 && beside(samples) < 1.2,
-        "{samples}: {}",
-        beside(samples)
-    );
-    assert!(
-        beside(0.5 * samples) > 0.8,
-        "half of {samples}: {}",
-        beside(0.5 * samples)
-    );
+    let [all, half] = [samples, 0.5 * samples].map(beside);
+    assert!(samples > 200.0 && all < 1.2 && half > 0.8, "{samples}: {all} {half}");
 }
 
 #[test]
@@ -274,11 +244,8 @@ fn a_compensated_force_drives_the_structure_alone() {
     for hertz in [2.0, 8.8156, 9.5, 55.0, 160.0] {
         let omega = TAU * hertz;
         let [by_force, by_impacts] = receptance(&scene, omega);
-        let row = structure
-            .shaker
-            .as_ref()
-            .unwrap()
-            .reference(structure.excitation, omega);
+        let shaker = structure.shaker.as_ref().unwrap();
+        let row = shaker.reference(structure.excitation, omega);
         let driven = host.frequency_response(&response, omega) / host.frequency_response(&row, omega);
         let hit = host.frequency_response_to_cavity(&response, omega)
             - by_force * host.frequency_response_to_cavity(&row, omega);
@@ -337,10 +304,8 @@ fn a_check_behind_a_shaker_measures_the_structure_and_names_a_fault() {
         let checked = check(&mut *Simulated::of(&scene).unwrap(), &plan).unwrap();
         assert_eq!(checked.verdict, Verdict::Healthy, "preset {n}");
         for (quantity, share) in checked.quantities.iter().zip([2e-5, 1e-3]) {
-            assert!(
-                (quantity.measured / quantity.expected - 1.0).abs() < share,
-                "preset {n}: {quantity:?}"
-            );
+            let error = quantity.measured / quantity.expected - 1.0;
+            assert!(error.abs() < share, "preset {n}: {quantity:?}");
         }
         for (factor, expected) in [(-1.0, Verdict::ResponseReversed), (0.0, Verdict::BaseDead)] {
             let mut rig = Altered::reading(&scene, |sensors| Sensors {
@@ -417,10 +382,8 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
 #[test]
 fn a_limit_of_the_drive_behind_a_force_is_in_newtons_wherever_it_is_named() {
     let limited = |newtons: &str| {
-        preset(
-            0,
-            &format!("[start] -> [phase_lock]\namplitude_max = {newtons}\n\n[start]"),
-        )
+        let limit = format!("[start] -> [phase_lock]\namplitude_max = {newtons}\n\n[start]");
+        preset(0, &limit)
     };
     let refused = limited("6.0").unwrap_err().to_string();
     let expected = "phase_lock.amplitude_max = 6 N: at least the drive of [excitation], 11.";
@@ -470,10 +433,8 @@ fn the_bench_plans_within_the_limits_of_a_shaker() {
     let mut failed = Vec::new();
     for (n, preset) in PRESETS.iter().enumerate() {
         let keys = ["voltage_max", "current_max", "stroke_max", "force_max"];
-        let text: Vec<_> = preset
-            .lines()
-            .filter(|line| !keys.iter().any(|key| line.starts_with(key)))
-            .collect();
+        let is_limit = |line: &&str| keys.iter().any(|key| line.starts_with(key));
+        let text: Vec<_> = preset.lines().filter(|line| !is_limit(line)).collect();
         let text = text.join("\n");
         let scene = Scene::parse("without limits", &text, &[]).unwrap();
         let structure = scene.structure.clone().unwrap();
@@ -482,26 +443,19 @@ fn the_bench_plans_within_the_limits_of_a_shaker() {
         let rig = Extremes { rig, structure, largest: Rc::clone(&largest) };
         let plan = Plan { decay: 0, ..scene.plan() };
         let mut controller = BuiltIn::new(&plan.lock).unwrap();
-        run(
-            &mut Measured::new(rig, scene.resonance, &scene.plant),
-            &mut controller,
-            &plan,
-            |_, _, _| {},
-        )
-        .unwrap();
+        let mut rig = Measured::new(rig, scene.resonance, &scene.plant);
+        run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
         for ((name, key), needed) in LIMITED.into_iter().zip(largest.get()) {
             for times in [1.6, 1.9, 2.2] {
                 let limited = text.replace("[shaker]", &format!("[shaker]\n{key} = {:?}", times * needed));
                 let ended = Scene::parse("limited", &limited, &[]).unwrap();
-                let error = record(&mut *Simulated::of(&ended).unwrap(), &ended)
-                    .err()
-                    .map(|error| error.to_string());
-                let is_named = |error: &String| error.contains(key) && error.contains(&format!("{needed:.2e}"));
-                failed.extend(
-                    error
-                        .filter(|error| !is_named(error))
-                        .map(|error| format!("{n}, {name} at {times}: {error}")),
-                );
+                let record = record(&mut *Simulated::of(&ended).unwrap(), &ended);
+                let Err(error) = record.map_err(|error| error.to_string()) else {
+                    continue;
+                };
+                if !(error.contains(key) && error.contains(&format!("{needed:.2e}"))) {
+                    failed.push(format!("{n}, {name} at {times}: {error}"));
+                }
             }
         }
     }
@@ -526,12 +480,8 @@ fn excessive(scene: &Scene, amplitude: f64) -> Result<Record, ExperimentError> {
         Ok(())
     };
     let mut controller = Foreign::new(&plan.lock, answer);
-    run(
-        &mut *Simulated::of(scene).unwrap(),
-        &mut controller,
-        &plan,
-        |_, _, _| {},
-    )
+    let mut rig = Simulated::of(scene).unwrap();
+    run(&mut *rig, &mut controller, &plan, |_, _, _| {})
 }
 
 #[test]
@@ -549,10 +499,9 @@ fn the_decay_after_the_stinger_is_cut_is_that_of_the_simulation() {
     let record = record_of(&scene);
     let truth = demodulated(&record, &scene);
     let points = decay_points(&record, &scene.knowledge(), DECAY_WINDOW).points;
-    let errors = points.iter().filter(|point| point.c > COMPARED_ABOVE);
-    let errors: Vec<f64> = errors
-        .filter_map(|point| Some(point.sigma - at(&truth, point.tau)?))
-        .collect();
+    let above = points.iter().filter(|point| point.c > COMPARED_ABOVE);
+    let errors = above.filter_map(|point| Some(point.sigma - at(&truth, point.tau)?));
+    let errors: Vec<f64> = errors.collect();
     let (count, error) = (errors.len(), mean_square(errors).sqrt());
     println!("{count} points, RMS error {error:.1e} of sigma");
     // The same fit of the default scene, without a shaker, has an error of 3e-3, because the window blurs the end.
@@ -565,16 +514,14 @@ fn a_decay_beside_a_mode_that_a_window_cannot_tell_apart_has_no_points() {
     let open = preset(2, CURRENT).unwrap();
     let apart = open.knowledge().nearest_pole;
     assert!((apart - 20.372).abs() < 1e-3, "{apart}");
-    let DecayPoints { points, end } = decay_points(&record_of(&open), &open.knowledge(), DECAY_WINDOW);
-    assert_eq!((points.len(), end), (0, DecayEnd::OtherMode));
+    let decay = |scene: &Scene| {
+        let DecayPoints { points, end } = decay_points(&record_of(scene), &scene.knowledge(), DECAY_WINDOW);
+        (points.len(), end)
+    };
+    assert_eq!(decay(&open), (0, DecayEnd::OtherMode));
     // Behind a voltage the coil holds the table, whose poles are real.
-    let shorted = preset(2, "").unwrap();
-    let DecayPoints { points, end } = decay_points(&record_of(&shorted), &shorted.knowledge(), DECAY_WINDOW);
-    assert!(
-        points.len() > 40 && end == DecayEnd::Synchrony,
-        "{} {end:?}",
-        points.len()
-    );
+    let (count, end) = decay(&preset(2, "").unwrap());
+    assert!(count > 40 && end == DecayEnd::Synchrony, "{count} {end:?}");
 }
 
 #[test]
@@ -615,10 +562,10 @@ fn faults_of_a_shaker_end_the_drive_in_time_with_the_channel_that_contradicts() 
     for (n, changes, faults, instants, within) in cases {
         let scene = preset(n, changes).unwrap();
         let period = scene.dimensionless().natural_period();
-        for (fault, periods) in faults
+        let pairs = faults
             .iter()
-            .flat_map(|fault| instants.iter().map(move |one| (*fault, *one)))
-        {
+            .flat_map(|fault| instants.iter().map(move |one| (*fault, *one)));
+        for (fault, periods) in pairs {
             let held = || {
                 let healthy = record_of(&scene);
                 (healthy.settled + 30) as f64 * healthy.sample_time
@@ -633,19 +580,12 @@ fn faults_of_a_shaker_end_the_drive_in_time_with_the_channel_that_contradicts() 
                 let zero = Rc::new(Cell::new(None));
                 let told = Rc::clone(&zero);
                 let mut rig = faulty(&scene, fault, begins + phase * period, move |time| told.set(time)).unwrap();
-                let error = match record(&mut rig, &scene) {
-                    Err(error) => error.to_string(),
-                    Ok(record) => format!(
-                        "{:.1} s without an error",
-                        record.samples.len() as f64 * record.sample_time
-                    ),
-                };
+                let ended = record(&mut rig, &scene).map(|record| record.samples.len());
                 drop(rig);
-                let time = zero.get();
-                assert!(
-                    error.contains(name) && time.is_some_and(|time| time < within),
-                    "{n}, {changes}, {fault:?} after {periods} periods: {time:?}, {error}"
-                );
+                let is_named = ended.as_ref().is_err_and(|error| error.to_string().contains(name));
+                let is_off = zero.get().is_some_and(|time| time < within);
+                let case = format!("{n}, {changes}, {fault:?} after {periods} periods");
+                assert!(is_named && is_off, "{case}: {zero:?}, {ended:?}");
             }
         }
     }
@@ -667,10 +607,8 @@ fn an_amplifier_that_controls_the_current_needs_the_voltage_for_it() {
     let amplitude = scene.units().command.of_metres(10.0 * scene.amplitude);
     let drive = vines_bench::rig::Drive { omega, amplitude, displacement: 0.0 };
     let error = (0..20_000).find_map(|_| rig.advance(drive, step).err());
-    assert!(
-        matches!(error, Some(RigError::ShakerLimit { name: "voltage", value, .. }) if value.abs() > 4.0),
-        "{error:?}"
-    );
+    let is_limit = matches!(error, Some(RigError::ShakerLimit { name: "voltage", value, .. }) if value.abs() > 4.0);
+    assert!(is_limit, "{error:?}");
 }
 
 #[test]
@@ -694,12 +632,8 @@ fn a_heavy_shaker_or_one_in_other_units_is_doubted() {
     ] {
         let scene = preset(n, changes).unwrap();
         let names: Vec<_> = scene.implausible().map(|one| one.name).collect();
-        let is_named = |name: &&str| name.contains(named);
-        assert_eq!(
-            names.iter().any(is_named),
-            !named.is_empty(),
-            "{n}, {changes}: {names:?}"
-        );
+        let is_named = names.iter().any(|name| name.contains(named));
+        assert_eq!(is_named, !named.is_empty(), "{n}, {changes}: {names:?}");
     }
     // Without a shaker.
     assert_eq!(paper(&[]).implausible().count(), 0);

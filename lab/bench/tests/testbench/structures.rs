@@ -76,35 +76,23 @@ fn a_force_through_much_damping_is_checked_and_its_points_belong_to_the_scene() 
     for scene in [Scene::parse("scene", oscillator, &[]).unwrap(), paper(&of_base)] {
         let found = check(&mut *Simulated::of(&scene.clone().at_rest()).unwrap(), &scene.plan()).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
-        assert!(
-            found
-                .quantities
-                .iter()
-                .all(|one| (one.measured - one.expected).abs() < 0.02),
-            "{found:?}"
-        );
+        let is_near = |one: &CheckedQuantity| (one.measured - one.expected).abs() < 0.02;
+        assert!(found.quantities.iter().all(is_near), "{found:?}");
         let points = tracked_of(&scene).points;
-        let points: Vec<MeasuredPoint> = points
-            .iter()
-            .filter(|one| one.settled)
-            .map(|one| one.at.measured(&scene.units()))
-            .collect();
+        let settled = points.iter().filter(|one| one.settled);
+        let points: Vec<MeasuredPoint> = settled.map(|one| one.at.measured(&scene.units())).collect();
         assert!(points.len() > 20, "{}", points.len());
         assert!(contradiction(&points, scene.definition(), &scene.plant).is_none());
     }
 }
 
 #[test]
-fn the_check_of_a_damped_beam_takes_no_other_mode_for_a_late_response() {
+fn a_check_takes_neither_another_mode_nor_its_beat_for_a_delay_whether_the_drawing_is_exact_or_not() {
     // Beside the drive, the second mode adds half of the driven one's static response.
     let damped = "damping = 0.006 -> damping = 0.03 ;; root = 0.3 -> root = 0.45 ;; F = 1.2 -> F = 5";
     let scene = beam(damped).unwrap();
     let found = check(&mut *Simulated::of(&scene).unwrap(), &scene.plan()).unwrap();
     assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
-}
-
-#[test]
-fn the_check_of_two_close_modes_takes_no_beat_for_a_delay_whether_the_drawing_is_exact_or_not() {
     let close = "8.8156, damping = 0.006 -> 8.8156, damping = 0.00015 ;; 55.274, damping = 0.006 -> 9.2488, damping = 0.00126 ;; \
                  root = 0.3, tip = -0.51252 -> root = 0.06, tip = 0.18";
     let scene = beam(close).unwrap();
@@ -175,21 +163,16 @@ fn residues_of_a_real_mode_give_its_mass_normalised_shape() {
     let scene = of(&folder, residues).unwrap();
     let structure = scene.structure.unwrap();
     let mode = structure.mode();
-    assert!(
-        (mode.shape[0] - 0.51252).abs() < 1e-12 && (mode.shape[1] - 0.1).abs() < 1e-12,
-        "{mode:?}"
-    );
-    assert!(mode.out_of_phase < 1e-15);
+    let off = [mode.shape[0] - 0.51252, mode.shape[1] - 0.1].map(f64::abs);
+    assert!(off[0].max(off[1]) < 1e-12 && mode.out_of_phase < 1e-15, "{mode:?}");
     fs::write(folder.path().join("beam.csv"), text.replace(", -", ", ")).unwrap();
     says(of(&folder, residues), "negative modal mass");
     fs::write(folder.path().join("beam.csv"), &text).unwrap();
+    let force = "excitation = \"force\"\ndrive = \"root\"\n -> ";
     for (changes, parts) in [
         ("reference = \"root\"\n -> ", "`reference` is missing | tip, root"),
         ("\"beam -> \"none", "residues (none.csv) | relative to the scene"),
-        (
-            "excitation = \"force\"\ndrive = \"root\"\n -> ",
-            "residues of a receptance belong to excitation",
-        ),
+        (force, "residues of a receptance belong to excitation"),
     ] {
         says(of(&folder, &changed(residues, changes)), parts);
     }
@@ -230,10 +213,9 @@ fn complex_residues_of_as_many_points_as_modes_give_the_structure_of_the_matrice
     let noisy = csv(16);
     let lines: Vec<&str> = noisy.lines().collect();
     let one: Vec<f64> = lines[1].split(", ").map(|cell| cell.parse().unwrap()).collect();
-    let turned = format!(
-        "{}, {}, {}, {}, {}, {}",
-        one[0], one[1], -one[2], one[3], -one[4], one[5]
-    );
+    let turned = [one[0], one[1], -one[2], one[3], -one[4], one[5]]
+        .map(|cell| cell.to_string())
+        .join(", ");
     fs::write(folder.path().join("beam.csv"), [lines[0], &turned, lines[2]].join("\n")).unwrap();
     let real = of(&folder, &text).unwrap().structure.unwrap();
     assert!(real.rows.iter().flatten().all(|[_, velocity]| *velocity == 0.0) && real.modes[0].out_of_phase > 1e-4);
@@ -319,8 +301,8 @@ fn matrices_that_are_no_tables_not_symmetric_or_not_positive_are_refused_with_th
 #[test]
 fn shapes_that_are_not_mass_normalised_are_refused_with_their_norm() {
     let folder = matrices(GOOD);
-    let modes =
-        "M = \"m.csv\"\nmodes = [{ frequency = 0.2, damping = 0.01, shape = { tip = 0.6, root = 0.565685 } }]\n";
+    let mode = "{ frequency = 0.2, damping = 0.01, shape = { tip = 0.6, root = 0.565685 } }";
+    let modes = &format!("M = \"m.csv\"\nmodes = [{mode}]\n");
     let scene = of(&folder, modes).unwrap();
     assert!((scene.structure.unwrap().mode().drive - (0.6 + 2.0 * 0.565685)).abs() < 1e-12);
     for (changes, parts) in [
@@ -344,23 +326,14 @@ fn the_presets_say_which_mode_takes_the_stability_of_the_1_1_motion() {
     let [orbit] = &resonant.orbits[..] else {
         panic!("{:?}", resonant.orbits)
     };
-    let alone = |omega: f64| {
-        let branches = &resonant.facts.alone;
-        let all = branches.iter().flat_map(|branch| &branch.orbits);
-        all.min_by(|one, other| (one.omega - omega).abs().total_cmp(&(other.omega - omega).abs()))
-            .unwrap()
-            .stability
-            .stable
-    };
-    assert!(orbit.stability.stable && !alone(orbit.omega));
+    let apart = |one: &&StructureOrbit| (one.omega - orbit.omega).abs();
+    let alone = resonant.facts.alone.iter().flat_map(|branch| &branch.orbits);
+    let alone = alone.min_by(|one, other| apart(one).total_cmp(&apart(other)));
+    assert!(orbit.stability.stable && !alone.unwrap().stability.stable);
     // The stable motion of the frame lies between its modes, and the backbone passes through it.
     let frame = survey("frame");
-    let [orbit] = frame
-        .orbits
-        .iter()
-        .filter(|orbit| orbit.stability.stable)
-        .collect::<Vec<_>>()[..]
-    else {
+    let stable = frame.orbits.iter().filter(|orbit| orbit.stability.stable);
+    let [orbit] = stable.collect::<Vec<_>>()[..] else {
         panic!("{:?}", frame.orbits)
     };
     let near = |one: &&StructureOrbit| (one.drive / orbit.drive - 1.0).hypot(one.omega / orbit.omega - 1.0) < 0.01;
@@ -399,13 +372,8 @@ fn points_of_a_structure_without_its_other_modes_are_those_of_the_driven_mode() 
 fn a_level_of_a_structure_waits_until_less_than_the_precision_is_left_of_what_rings_beside_the_driven_mode() {
     assert_eq!(paper(&[]).knowledge().rings, [None; 2]);
     // The second mode at three times the frequency takes nine periods to fall by a factor of e.
-    let settings = [
-        "backbone.precision=9e-4",
-        "backbone.C_from=0.7",
-        "backbone.C_to=0.54",
-        "backbone.points=5",
-    ];
-    let scene = preset("resonant", &settings).unwrap();
+    let settings = "backbone.precision=9e-4 backbone.C_from=0.7 backbone.C_to=0.54 backbone.points=5";
+    let scene = preset("resonant", &settings.split(' ').collect::<Vec<_>>()).unwrap();
     let tracked = tracked_of(&scene);
     let curves = structure_backbone(&scene, &scene.dimensionless()).unwrap();
     for point in &tracked.points {
@@ -417,14 +385,12 @@ fn a_level_of_a_structure_waits_until_less_than_the_precision_is_left_of_what_ri
 
 #[test]
 fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asymmetric() {
+    let lower = ["excitation.G=1.05", "resonance.sensor_quantity=velocity"];
     for (name, settings) in [
         ("resonant", &[][..]),
         ("frame", &[]),
-        ("cantilever", &["excitation.G=1.05"]),
-        (
-            "cantilever",
-            &["excitation.G=1.05", "resonance.sensor_quantity=velocity"],
-        ),
+        ("cantilever", &lower[..1]),
+        ("cantilever", &lower),
     ] {
         // Long enough for the response to come to rest.
         let scene = preset(name, &[settings, &["record.hold_periods=480"]].concat()).unwrap();
@@ -437,11 +403,8 @@ fn the_loop_finds_the_stable_exact_orbits_of_the_presets_and_refuses_what_is_asy
     }
     // Mode 3 makes the motion asymmetric there, on its way as well.
     let scene = preset("cantilever", &[]).unwrap();
-    let refused = super::record(&mut *Simulated::of(&scene).unwrap(), &scene).map(|_| ());
-    assert!(
-        matches!(refused, Err(ExperimentError::NotReached { .. })),
-        "{refused:?}"
-    );
+    let refused = super::record(&mut *Simulated::of(&scene).unwrap(), &scene).unwrap_err();
+    assert!(matches!(refused, ExperimentError::NotReached { .. }), "{refused}");
 }
 
 const CLOSE: &str = "\
@@ -493,23 +456,16 @@ fn matrices_are_plain_tables_of_any_delimiter() {
         modes.iter().map(|mode| mode.omega).collect::<Vec<f64>>()
     };
     let expected = omegas("k.csv -> tip, root\\n2, -1\\n-1, 4");
-    for text in [
-        "tip; root\n2; -1\n-1; 4\n",
-        "tip;root\n2,0;-1,0\n-1,0;4,0\n",
-        "tip\troot\n2\t-1\n-1\t4\n",
-    ] {
+    let decimal_commas = "tip;root\n2,0;-1,0\n-1,0;4,0\n";
+    for text in ["tip; root\n2; -1\n-1; 4\n", decimal_commas, "tip\troot\n2\t-1\n-1\t4\n"] {
         assert_eq!(omegas(&format!("k.csv -> {text}")), expected, "{text}");
     }
 }
 
 #[test]
 fn all_orbits_of_a_structure_are_found_also_outside_the_frequencies_of_the_controller() {
-    let count = |range: [&str; 2]| {
-        Survey::of(&preset("frame", &range).unwrap(), &|| ())
-            .unwrap()
-            .orbits
-            .len()
-    };
+    let survey = |range: [&str; 2]| Survey::of(&preset("frame", &range).unwrap(), &|| ()).unwrap();
+    let count = |range| survey(range).orbits.len();
     let narrow = count(["controller.omega_min=0.999", "controller.omega_max=1.001"]);
     let wide = count(["controller.omega_min=0.5", "controller.omega_max=1.8"]);
     assert_eq!(narrow, wide);
@@ -543,11 +499,9 @@ fn the_uncertainty_of_a_lock_covers_what_a_response_that_still_creeps_is_off() {
     let at = identified(&scene).unwrap().lock.at;
     let curve = ExactCurve::of_scene(&scene, &scene.dimensionless(), [at.sigma, at.c]);
     let distance = curve.distance(at.c, at.sigma, at.g).unwrap();
-    let (sigma, g) = (distance.sigma.unwrap().abs(), distance.g.unwrap().abs());
-    assert!(
-        at.u_sigma < 2e-3 && sigma < 2.0 * at.u_sigma && g < 2.0 * at.u_g,
-        "{distance:?}: {at:?}"
-    );
+    let [sigma, g] = [distance.sigma, distance.g].map(|off| off.unwrap().abs());
+    let is_near = sigma < 2.0 * at.u_sigma && g < 2.0 * at.u_g;
+    assert!(at.u_sigma < 2e-3 && is_near, "{distance:?}: {at:?}");
 }
 
 /// Receptances and base responses of modes at points, by the sum over the modes.
