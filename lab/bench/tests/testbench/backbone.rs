@@ -110,31 +110,31 @@ fn tracked_from_sensors(
     change: impl Fn(&mut Parameters),
     checked: bool,
 ) -> Result<TrackedComparison, ExperimentError> {
-    let few = "start.dq2=0 backbone.points=7 backbone.C_from=0.6 backbone.C_to=0.3";
-    let scene = dimensionless(&format!("{few} {settings}"));
-    let mut plan = scene.plan();
+    let scene = dimensionless(&format!("{FEW} {settings}"));
     let mut other = scene.clone();
     change(&mut other.plant);
-    let mut rig = SensorsOnly::around(Simulated::of(&other).unwrap());
+    compared_from_sensors(&scene, &other, checked)
+}
+
+const FEW: &str = "start.dq2=0 backbone.points=7 backbone.C_from=0.6 backbone.C_to=0.3";
+
+/// The backbone of a rig by a client whose scene is another one.
+fn compared_from_sensors(scene: &Scene, rig: &Scene, checked: bool) -> Result<TrackedComparison, ExperimentError> {
+    let mut plan = scene.plan();
+    let mut rig = SensorsOnly::around(Simulated::of(rig).unwrap());
     if checked {
         let linear = check(&mut rig, &plan).unwrap().linear.expect("a linear response");
         plan = scene.plan_on(plan.knowledge.measured(linear.response));
     }
-    compared(&mut rig, &scene, &plan)
+    compared(&mut rig, scene, &plan)
 }
 
 /// A filter leaves little of the noise in a period but its first harmonics: as it is there, it is at the fundamental.
 #[test]
 fn behind_an_anti_alias_filter_that_the_scene_does_not_have_levels_settle_as_well() {
-    let few = "start.dq2=0 backbone.points=7 backbone.C_from=0.6 backbone.C_to=0.3";
     for (snr, filter) in [(60, 10), (60, 20), (80, 5)] {
-        let scene = dimensionless(few);
-        let chain = format!("{few} chain.snr={snr} chain.filter={filter} chain.seed=7 chain.adc_bits=16");
-        let mut rig = SensorsOnly::around(Simulated::of(&dimensionless(&chain)).unwrap());
-        let plan = scene.plan();
-        let linear = check(&mut rig, &plan).unwrap().linear.expect("a linear response");
-        let plan = scene.plan_on(plan.knowledge.measured(linear.response));
-        let found = compared(&mut rig, &scene, &plan).unwrap();
+        let chain = format!("{FEW} chain.snr={snr} chain.filter={filter} chain.seed=7 chain.adc_bits=16");
+        let found = compared_from_sensors(&dimensionless(FEW), &dimensionless(&chain), true).unwrap();
         let settled = found.points.iter().filter(|one| one.point.settled);
         let off = |one: &TrackedPoint| {
             let (at, exact) = (one.point.at, one.exact.unwrap());
@@ -194,10 +194,7 @@ fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
                         continue;
                     }
                 };
-                let expected = match checked {
-                    true => Regime::NoImpacts,
-                    false => Regime::NotEstablished,
-                };
+                let expected = [Regime::NotEstablished, Regime::NoImpacts][usize::from(checked)];
                 let is_expected = found.points.iter().all(|one| one.point.regime == expected);
                 assert!(is_expected && found.doubt().is_some(), "{case}: {:?}", found.points);
             }

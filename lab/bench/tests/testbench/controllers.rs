@@ -33,26 +33,26 @@ fn a_controller_that_does_not_release_the_drive_is_an_error_and_the_bench_switch
         assert!(message.contains(words), "{message}");
         assert_eq!(last, [0.0; 2], "{message}");
     };
+    let commands = |of: &dyn Fn(f64) -> [f64; 2], words: &str| {
+        let command = |command: &mut Command, asked: usize| {
+            [command.drive.amplitude, command.drive.displacement] = of(asked as f64).map(|share| share * amplitude);
+        };
+        refused(&command, words);
+    };
     let still = "after `active` became false, it commands E = ";
-    refused(&|command, _| command.drive.amplitude = amplitude, still);
-    refused(
-        &|command, _| command.drive.amplitude = amplitude,
-        "9.2461e-5 m, 1 times the requested drive",
+    commands(
+        &|_| [1.0, 0.0],
+        &format!("{still}9.2461e-5 m, 1 times the requested drive"),
     );
     // A ramp without an end.
-    refused(
-        &|command, asked| command.drive.amplitude = amplitude * (-(asked as f64) / 500.0).exp(),
-        still,
-    );
-    refused(&|command, _| command.drive.amplitude = 1e-12, "it commands E = 1e-12 m");
-    refused(
-        &|command, asked| command.drive.displacement = amplitude * (0.06 * asked as f64).cos(),
+    commands(&|asked| [(-asked / 500.0).exp(), 0.0], still);
+    commands(&|_| [1e-12 / amplitude, 0.0], "it commands E = 1e-12 m");
+    commands(
+        &|asked| [0.0, (0.06 * asked).cos()],
         "it commands E = 0, but a displacement of",
     );
-    refused(
-        &|command, asked| command.drive.amplitude = if asked < 1000 { 0.0 } else { amplitude },
-        "10.0 periods after it released the drive, it commands E = 9.2461e-5 m",
-    );
+    let again = "10.0 periods after it released the drive, it commands E = 9.2461e-5 m";
+    commands(&|asked| [f64::from(asked >= 1000.0), 0.0], again);
 }
 
 #[test]
@@ -66,12 +66,8 @@ fn a_decay_begins_at_the_end_of_the_ramp() {
     });
     let record = record.unwrap();
     assert_eq!(record.released - record.hold_end, ramp - 1);
-    assert!(
-        record
-            .decay()
-            .iter()
-            .all(|sample| sample.command.drive.amplitude == 0.0)
-    );
+    let mut decay = record.decay().iter();
+    assert!(decay.all(|sample| sample.command.drive.amplitude == 0.0));
     let found = identify(&record, &scene.plan()).unwrap();
     let first = found.decay.points[0];
     assert!(first.c < 0.97 * found.lock.at.c, "{} {}", first.c, found.lock.at.c);
@@ -92,11 +88,8 @@ fn identified_on(
         if !is_off {
             omega.set(drive.omega);
         }
-        let goes_on = Drive {
-            omega: omega.get(),
-            amplitude: amplitude * left(since),
-            ..drive
-        };
+        let (omega, amplitude) = (omega.get(), amplitude * left(since));
+        let goes_on = Drive { omega, amplitude, ..drive };
         (if driven && is_off { goes_on } else { drive }, step)
     };
     let mut rig = Altered { drive: Box::new(drive), ..Altered::reading(scene, &mut read) };
@@ -112,11 +105,8 @@ fn a_lock_is_at_the_requested_drive_and_its_decay_begins_where_the_base_rests_al
         // A base that goes on has no free decay.
         for share in [1.0, 0.05] {
             let found = identified_on(&scene, |_| share, |sensors| sensors).unwrap();
-            assert_eq!(
-                (found.decay.points.len(), found.decay.end),
-                (0, DecayEnd::Driven),
-                "{snr}"
-            );
+            let decay = (found.decay.points.len(), found.decay.end);
+            assert_eq!(decay, (0, DecayEnd::Driven), "{snr}");
             let ratio = found.base_after_release.unwrap().value / scene.amplitude;
             assert!((ratio / share - 1.0).abs() < 0.15, "{snr}: {ratio} {share}");
         }
@@ -124,11 +114,8 @@ fn a_lock_is_at_the_requested_drive_and_its_decay_begins_where_the_base_rests_al
         for (periods, [earliest, latest]) in [(0.0, [0.0, 0.2]), (10.0, [9.0, 10.5])] {
             let fades = |since: f64| (1.0 - since / (periods * period + 1.0)).max(0.0);
             let found = identified_on(&scene, fades, |sensors| sensors).unwrap();
-            assert!(
-                found.lock.at_requested_drive && found.decay.end != DecayEnd::Driven,
-                "{snr}: {:?}",
-                found.lock
-            );
+            let is_driven = found.decay.end == DecayEnd::Driven;
+            assert!(found.lock.at_requested_drive && !is_driven, "{snr}: {:?}", found.lock);
             // A point is the middle of its window of 2.5 periods.
             let first = found.decay.points[0].t_s / scene.dimensionless().natural_period() - 1.25;
             assert!((earliest..=latest).contains(&first), "{snr}, {periods}: {first}");
@@ -145,12 +132,8 @@ fn a_lock_is_at_the_requested_drive_and_its_decay_begins_where_the_base_rests_al
     };
     let found = identified_on(&scene, |_| 0.0, read).unwrap();
     let first = found.decay.points[0].t_s / scene.dimensionless().natural_period() - 1.25;
-    let clean = identified_on(&scene, |_| 0.0, |sensors| sensors)
-        .unwrap()
-        .decay
-        .points
-        .len();
-    let points = found.decay.points.len();
+    let clean = identified_on(&scene, |_| 0.0, |sensors| sensors).unwrap();
+    let [points, clean] = [&found, &clean].map(|one| one.decay.points.len());
     assert!(first < 0.5 && points.abs_diff(clean) <= 4, "{first}: {points} {clean}");
 }
 
@@ -173,10 +156,8 @@ fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
                 Err(error) => error.to_string(),
                 Ok(found) => {
                     assert!(!found.lock.at_requested_drive, "{turned} {times}");
-                    format!(
-                        "{:.3} times the requested",
-                        found.lock.at.drive().value / found.lock.requested()
-                    )
+                    let ratio = found.lock.at.drive().value / found.lock.requested();
+                    format!("{ratio:.3} times the requested")
                 }
             },
         };
@@ -187,24 +168,17 @@ fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
     for turned in [20.0, -20.0, 8.0] {
         let message = said(turned, 1.0, None);
         let phase = format!("{turned:.2} ± ");
-        assert!(
-            message.contains(&phase) && message.contains("degrees off controller.phase_target"),
-            "{message}"
-        );
-        assert!(message.contains("the controller reports"), "{message}");
+        let words = [&phase, "degrees off controller.phase_target", "the controller reports"];
+        assert!(words.iter().all(|word| message.contains(word)), "{message}");
     }
     for times in [2.0, 0.5, 1.09, 0.91, 1.02] {
         let message = said(0.0, times, None);
-        assert!(
-            message.contains(&format!("{times:.3} times the requested")),
-            "{message}"
-        );
+        let ratio = format!("{times:.3} times the requested");
+        assert!(message.contains(&ratio), "{message}");
     }
     let both = said(20.0, 2.0, None);
-    assert!(
-        both.contains("degrees off controller.phase_target") && both.contains("2.000 times"),
-        "{both}"
-    );
+    let words = ["degrees off controller.phase_target", "2.000 times"];
+    assert!(words.iter().all(|word| both.contains(word)), "{both}");
 }
 
 #[test]
@@ -215,17 +189,12 @@ fn neither_a_loop_check_nor_a_held_sample_of_zero_cuts_the_stinger() {
     let force = |rig: &mut dyn Rig, amplitude: f64, holds: bool| {
         let amplitude = scene.knowledge().target.units.command.of_metres(amplitude);
         let sample = |n: u32| {
-            let sine = if n.is_multiple_of(10) {
-                0.0
-            } else {
-                (0.06 * f64::from(n)).sin()
-            };
+            let sine = (0.06 * f64::from(n)).sin() * f64::from(!n.is_multiple_of(10));
             let displacement = if holds { amplitude * sine } else { 0.0 };
             let drive = Drive { omega, amplitude, displacement };
-            let driven = if holds {
-                rig.hold(drive, step)
-            } else {
-                rig.advance(drive, step)
+            let driven = match holds {
+                true => rig.hold(drive, step),
+                false => rig.advance(drive, step),
             };
             driven.and_then(|()| rig.sense()).unwrap().reference.unwrap().abs()
         };

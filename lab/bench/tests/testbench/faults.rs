@@ -50,17 +50,13 @@ fn inject(settings: &[&str], instants: usize, limit: f64) {
             let phase = (0.618 * n as f64) % 1.0 * period;
             for (begins, tracks) in [(settled / 3.0, false), (settled, false), (tracking, true)] {
                 let (zero, ended) = injected(&scene, fault, begins + phase, tracks);
-                assert!(
-                    ended && zero.is_some_and(|time| time <= limit),
-                    "{name} at {begins} + {phase} s: {zero:?}"
-                );
+                let is_off = zero.is_some_and(|time| time <= limit);
+                assert!(ended && is_off, "{name} at {begins} + {phase} s: {zero:?}");
             }
             // The drive ramps down in two periods whatever happens.
             let (zero, _) = injected(&scene, fault, released + step, false);
-            assert!(
-                zero.is_some_and(|time| time <= 2.0 * period),
-                "{name} at the release: {zero:?}"
-            );
+            let is_off = zero.is_some_and(|time| time <= 2.0 * period);
+            assert!(is_off, "{name} at the release: {zero:?}");
         }
     }
 }
@@ -106,18 +102,13 @@ fn faults_in_the_first_periods_of_the_drive_are_found_within_a_second() {
 
 #[test]
 fn an_impact_on_a_small_response_and_the_acceleration_of_a_base_whose_drive_changes_are_no_faults() {
-    let accelerations = [
-        "resonance.sensor=q1",
-        "resonance.sensor_quantity=acceleration",
-        "resonance.reference_quantity=acceleration",
-        "plant.r=0.56",
-        "excitation.G=1.11",
-    ];
+    let accelerations = "resonance.sensor=q1 resonance.sensor_quantity=acceleration resonance.reference_quantity=acceleration \
+                         plant.r=0.56 excitation.G=1.11";
     for settings in [
-        &["plant.m=0.0783", "plant.r=0.845", "plant.c=5.905", "excitation.G=1.19"][..],
-        &accelerations,
+        "plant.m=0.0783 plant.r=0.845 plant.c=5.905 excitation.G=1.19",
+        accelerations,
     ] {
-        let scene = scene(settings);
+        let scene = scene(&settings.split(' ').collect::<Vec<_>>());
         let ended = record(&mut *Simulated::of(&scene).unwrap(), &scene);
         let is_fault = matches!(ended, Err(ExperimentError::Tripped { .. }));
         assert!(!is_fault, "{settings:?}: {:?}", ended.err());
@@ -183,18 +174,12 @@ fn the_limits_of_the_scene_guard_the_rig_whatever_controls_it() {
         let message = record.unwrap_err().to_string();
         assert!(message.contains(words) && largest <= limit, "{message} {largest}");
     };
-    refused(
-        &scene,
-        |command, _| command.drive.amplitude *= 1e3,
-        "phase_lock.amplitude_max allows 0.00052791 m",
-    );
+    let allowed = "phase_lock.amplitude_max allows 0.00052791 m";
+    refused(&scene, |command, _| command.drive.amplitude *= 1e3, allowed);
     refused(&scene, |command, _| command.drive.omega /= TAU, "not in Hz");
     refused(&scene, |command, _| command.drive.omega *= -1.0, "omega = -55.");
-    refused(
-        &scene,
-        |command, _| command.phase_error = Some(f64::NAN),
-        "phase_error = NaN rad",
-    );
+    let nan = |command: &mut Command, _: usize| command.phase_error = Some(f64::NAN);
+    refused(&scene, nan, "phase_error = NaN rad");
     let low = self::scene(&["phase_lock.response_max=0.003"]);
     refused(&low, |_, _| (), "phase_lock.response_max allows 0.003 m");
 }

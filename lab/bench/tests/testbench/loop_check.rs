@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use lovines::State;
 use vines_bench::loop_check::{LoopCheck, Verdict, check};
 use vines_bench::rig::{Chain, Drive, RigFault, SensorFault, Simulated, faulty};
-use vines_bench::scene::Scene;
+use vines_bench::scene::{Dimensionless, Scene};
 
 use super::common::{checked_faults, checked_rig, uniform};
 use super::{Altered, paper};
@@ -28,10 +28,8 @@ fn healthy_rigs_pass_and_faults_are_named() {
         // Four standard uncertainties; 3 % where noise is small.
         let limit = (4.0 * linear.u_gain).max(0.03);
         assert!((linear.response_gain / gain - 1.0).abs() < limit, "{linear:?}");
-        assert!(
-            (linear.damping_rate - rig_damping).abs() < 4.0 * linear.u_damping_rate,
-            "{linear:?}"
-        );
+        let off = (linear.damping_rate - rig_damping).abs();
+        assert!(off < 4.0 * linear.u_damping_rate, "{linear:?}");
         let integral = |damping: f64| phase_lock::Gains::from_bandwidth(linear.bandwidth, damping).integral;
         let ratio = |damping: f64| (integral(damping) / integral(rig_damping) - 1.0).abs();
         let limit = ratio(rig_damping + 4.0 * linear.u_damping_rate).max(0.01);
@@ -70,20 +68,15 @@ fn where_noise_hides_the_phase_the_check_raises_its_drive_up_to_that_of_the_scen
             let scene = at_rest(&[snr, seed]);
             let (found, [largest, turns]) = altered(&scene, 1.0, 0.0);
             assert_eq!(found.verdict, Verdict::Healthy, "{snr}, {seed}: {found:?}");
-            assert!(
-                shares.contains(&found.share) && found.periods < most,
-                "{snr}, {seed}: {found:?}"
-            );
+            let is_expected = shares.contains(&found.share) && found.periods < most;
+            assert!(is_expected, "{snr}, {seed}: {found:?}");
             assert!(largest <= found.share * scene.amplitude * (1.0 + 1e-12), "{largest}");
             assert!((turns - found.periods).abs() < 2.0, "{turns} {}", found.periods);
             // It ends at the phase where it began.
             assert!((turns - turns.round()).abs() < 1e-9, "{turns}");
             let linear = found.linear.unwrap();
-            let omega0 = scene.plant.natural_frequency();
-            assert!(
-                (linear.omega_0 - omega0).abs() < 4.0 * linear.u_damping_rate,
-                "{linear:?}"
-            );
+            let off = (linear.omega_0 - scene.plant.natural_frequency()).abs();
+            assert!(off < 4.0 * linear.u_damping_rate, "{linear:?}");
         }
     }
 }
@@ -143,11 +136,8 @@ fn what_would_falsify_a_measurement_is_refused_also_where_noise_hides_it_at_a_hu
     // A delay of both channels cancels; from 40 on, the phase alone looks like the opposite sign.
     let scene = at_rest(&[]);
     for delay in [16, 30, 40, 44, 48] {
-        let found = check(
-            &mut faulty(&scene, Both(Late(delay)), 0.0, |_| {}).unwrap(),
-            &scene.plan(),
-        )
-        .unwrap();
+        let mut rig = faulty(&scene, Both(Late(delay)), 0.0, |_| {}).unwrap();
+        let found = check(&mut rig, &scene.plan()).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
         assert!((found.base.unwrap().delay - delay as f64).abs() < 0.5, "{found:?}");
     }
@@ -180,9 +170,7 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
         assert!((config.damping_rate.unwrap() / linear.damping_rate - 1.0).abs() < 1e-12);
         assert!((config.omega_start / linear.omega_0 - 1.0).abs() < 1e-12);
         assert!((config.response_gain - 0.5 * linear.omega_0).abs() < 1e-9);
-        assert_eq!(
-            (measured.epsilon, measured.r, measured.b, measured.g),
-            (stated.epsilon, stated.r, stated.b, stated.g)
-        );
+        let kept = |of: &Dimensionless| [of.epsilon, of.r, of.b, of.g];
+        assert_eq!(kept(&measured), kept(&stated));
     }
 }

@@ -21,7 +21,12 @@ fn refused(cases: &[&str]) {
 }
 
 #[test]
-fn the_default_scene_is_the_paper_file() {
+fn the_default_scene_is_the_paper_file_and_a_dimensionless_one_its_own_model() {
+    let scene = preset("dimensionless", &[]).unwrap();
+    let numbers = scene.dimensionless();
+    assert_eq!((numbers.omega0, numbers.b), (1.0, 1.0));
+    assert_eq!((numbers.epsilon, scene.plant.damping), (0.0084, 0.0084 * 1.43));
+    assert!((numbers.lambda - 1.43).abs() < 1e-14 && (numbers.g - 1.1).abs() < 1e-14);
     let embedded = paper(&[]);
     assert_eq!(embedded, preset("paper", &[]).unwrap());
     let numbers = embedded.dimensionless();
@@ -32,15 +37,6 @@ fn the_default_scene_is_the_paper_file() {
     assert_eq!(embedded.record, RecordSettings::default());
     assert_eq!(numbers.definition, Definition::default());
     assert_eq!(paper(&["plant.b=1"]).plan().levels[..3], [0.7, 0.68, 0.66]);
-}
-
-#[test]
-fn a_dimensionless_scene_is_its_own_model() {
-    let scene = preset("dimensionless", &[]).unwrap();
-    let numbers = scene.dimensionless();
-    assert_eq!((numbers.omega0, numbers.b), (1.0, 1.0));
-    assert_eq!((numbers.epsilon, scene.plant.damping), (0.0084, 0.0084 * 1.43));
-    assert!((numbers.lambda - 1.43).abs() < 1e-14 && (numbers.g - 1.1).abs() < 1e-14);
 }
 
 #[test]
@@ -130,10 +126,8 @@ fn keys_that_contradict_each_other_are_refused_and_without_the_last_of_them_a_sc
         let settings: Vec<&str> = settings.split(' ').collect();
         let message = says(preset(scene, &settings), parts);
         let is_range = message.starts_with("backbone.precision");
-        assert!(
-            is_range || preset(scene, &settings[..settings.len() - 1]).is_ok(),
-            "{rule}"
-        );
+        let without = preset(scene, &settings[..settings.len() - 1]);
+        assert!(is_range || without.is_ok(), "{rule}");
     }
 }
 
@@ -141,6 +135,7 @@ fn keys_that_contradict_each_other_are_refused_and_without_the_last_of_them_a_sc
 fn a_mistake_in_a_file_is_reported_with_its_line_and_missing_and_mixed_keys_with_those_needed() {
     says(preset("nowhere/at-all", &[]), "nowhere/at-all.toml");
     let plant = "[plant]\nepsilon = 0.01\nlambda = 1\nr = 0.5\n";
+    let both = format!("{plant}[excitation]\nG = 1\nE = 1");
     for (text, parts) in [
         ("[plant]\nM = 1\nkk = 2\n", "my.toml | line 3 | `kk` | `k`"),
         ("[plant]\nM = \"heavy\"\n", "my.toml | line 2 | heavy"),
@@ -148,10 +143,7 @@ fn a_mistake_in_a_file_is_reported_with_its_line_and_missing_and_mixed_keys_with
         ("[plant]\nM = 1\nr = 0.5", "[plant] has no `k`"),
         ("[plant]\nM = 1\nepsilon = 0.5", "mixes"),
         (plant, "[excitation] has no key"),
-        (
-            &format!("{plant}[excitation]\nG = 1\nE = 1"),
-            "[excitation] has G and E | give either G",
-        ),
+        (&both, "[excitation] has G and E | give either G"),
     ] {
         says(Scene::parse("my.toml", text, &[]), parts);
     }
@@ -159,22 +151,17 @@ fn a_mistake_in_a_file_is_reported_with_its_line_and_missing_and_mixed_keys_with
 
 #[test]
 fn text_on_the_command_line_needs_no_quotes_and_what_is_no_assignment_is_refused() {
-    let definition = Definition {
-        reference: Reference::Force,
-        sensor: Sensor::Q1,
-        sensor_quantity: Measurand::Acceleration,
-        ..Definition::default()
-    };
-    let scene = paper(&[
-        "resonance.reference=\"force\"",
-        "resonance.sensor=q1",
-        "resonance.sensor_quantity=acceleration",
-        "chain.adc_bits = none",
-    ]);
-    assert_eq!(
-        (scene.dimensionless().definition, scene.chain.adc_bits),
-        (definition, None)
+    let sensors = ["resonance.sensor=q1", "resonance.sensor_quantity=acceleration"];
+    let scene = paper(
+        &[
+            &sensors[..],
+            &["resonance.reference=\"force\"", "chain.adc_bits = none"],
+        ]
+        .concat(),
     );
+    let Definition { reference, sensor, sensor_quantity, .. } = scene.dimensionless().definition;
+    let found = (reference, sensor, sensor_quantity, scene.chain.adc_bits);
+    assert_eq!(found, (Reference::Force, Sensor::Q1, Measurand::Acceleration, None));
     refused(&[
         "plant.r=0.7 m => plant.r=0.7 m | \"0.7 m\", expected a number",
         "plant.r= => plant.r= | expected a number",
@@ -345,19 +332,18 @@ fn what_theory_leaves_out_of_a_cavity_is_named_and_of_an_ideal_one_it_is_nothing
     let written = serde_json::to_value(&ideal).unwrap();
     assert_eq!(written["plant"].as_object().unwrap().len(), 6);
     assert_eq!((ideal.left_out(), ideal.knowledge().is_symmetric), (None, true));
+    let several = "plant.mu_k=0.05 plant.theta=0.1 plant.b_plus=0.011";
     for (settings, named) in [
-        (&["plant.mu_k=0.05"][..], "friction"),
+        ("plant.mu_k=0.05", "friction"),
+        (several, "friction, the gaps b_plus and b_minus and tilt"),
         (
-            &["plant.mu_k=0.05", "plant.theta=0.1", "plant.b_plus=0.011"],
-            "friction, the gaps b_plus and b_minus and tilt",
-        ),
-        (
-            &["plant.r_minus=0.7"],
+            "plant.r_minus=0.7",
             "the restitution of r_law, r_plus, r_minus and r_min",
         ),
-        (&["plant.r_scatter=0.01"], "the scatter of the restitution"),
+        ("plant.r_scatter=0.01", "the scatter of the restitution"),
     ] {
-        assert_eq!(paper(settings).left_out().unwrap(), named);
+        let settings: Vec<&str> = settings.split(' ').collect();
+        assert_eq!(paper(&settings).left_out().unwrap(), named);
     }
     assert!(!paper(&["plant.r_minus=0.7"]).knowledge().is_symmetric);
 }

@@ -17,7 +17,7 @@ use vines_bench::rig::{
 use vines_bench::scene::Scene;
 
 use super::preset;
-use super::{Altered, identified};
+use super::{Altered, changed, identified};
 
 /// The frame with an accelerometer. Its driven mode has 8.8156 Hz, a damping ratio of 0.006 and the shapes 0.45 at drive and sensor and 0.51252 at the
 /// cavity.
@@ -124,10 +124,8 @@ fn assert_states(text: &str, expected: &[(f64, &str)]) {
     let is_same = |((value, unit), (expected, of)): (&(f64, &str), &(f64, &str))| {
         unit == of && (value / expected - 1.0).abs() < 6e-5
     };
-    assert!(
-        found.len() == expected.len() && found.iter().zip(expected).all(is_same),
-        "{text}\n{found:?}\n{expected:?}"
-    );
+    let are_same = found.len() == expected.len() && found.iter().zip(expected).all(is_same);
+    assert!(are_same, "{text}\n{found:?}\n{expected:?}");
 }
 
 /// What a run ends with, beside what reached the rig and what it read.
@@ -135,6 +133,10 @@ fn ended<T>(scene: &Scene, silent: bool, run: impl FnOnce(&mut Altered, &Scene) 
     let log = RefCell::default();
     let error = run(&mut logged(scene, silent, &log), scene).err().unwrap();
     (error, log.into_inner())
+}
+
+fn by_search(rig: &mut Altered, scene: &Scene) -> Result<Record, String> {
+    super::record(rig, scene).map_err(|error| error.to_string())
 }
 
 #[test]
@@ -153,16 +155,11 @@ fn a_drive_by_force_that_is_refused_is_stated_in_newton_and_a_response_as_its_se
     let (record, log) = run(&low, |_, _| ());
     let read = (log.last().response, "m/s²");
     assert_states(&record.unwrap_err().to_string(), &[&[read][..], &limit].concat());
-    let (error, log) = ended(&low, false, |rig, scene| {
-        super::record(rig, scene).map_err(|error| error.to_string())
-    });
+    let (error, log) = ended(&low, false, by_search);
     // The controller has ramped the drive down since.
-    let at = log
-        .readings
-        .iter()
-        .position(|sensors| sensors.response.abs() > limit[1].0)
-        .unwrap();
-    let Sensors { response, reference } = log.readings[at];
+    let mut readings = log.readings.iter();
+    let above = readings.find(|sensors| sensors.response.abs() > limit[1].0);
+    let Sensors { response, reference } = *above.unwrap();
     let expected = [(response, "m/s²"), (reference.unwrap(), "N"), (response.abs(), "m/s²")];
     assert_states(&error, &[&expected[..], &limit].concat());
 }
@@ -198,7 +195,6 @@ fn a_drive_by_force_that_is_not_released_is_stated_in_newton() {
 fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
     let b = 0.01 * 0.45 / 0.51252;
     let is_near = |value: f64, expected: f64| (value / expected - 1.0).abs() < 0.02;
-    let by_search = |rig: &mut Altered, scene: &Scene| super::record(rig, scene).map_err(|error| error.to_string());
     let of = |timeout: &str, silent| ended(&frame(&[timeout]), silent, by_search).0;
     let errors = [false, true].map(|silent| of("phase_lock.acquire_timeout=5", silent));
     assert_eq!(errors[0], errors[1]);
@@ -210,29 +206,19 @@ fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
     let [_, _, (high, "m"), (nearest, "m"), (drive, "N")] = with_units(&error)[..] else {
         panic!("{error}")
     };
-    assert!(
-        is_near(nearest, 0.85 * b) && high / nearest < 1.2 && drive > 0.0,
-        "{error}"
-    );
-    let (scene, log) = (
-        frame(&["controller.phase_target=-80", "start.dq2=0"]),
-        RefCell::default(),
-    );
+    let is_nearest = is_near(nearest, 0.85 * b) && high / nearest < 1.2;
+    assert!(is_nearest && drive > 0.0, "{error}");
+    let scene = frame(&["controller.phase_target=-80", "start.dq2=0"]);
+    let log = RefCell::default();
     let record = super::record(&mut logged(&scene, true, &log), &scene).unwrap();
     let error = identify(&record, &scene.plan()).unwrap_err().to_string();
     let [(locked, "m")] = with_units(&error)[..] else {
         panic!("{error}")
     };
-    assert!(
-        is_near(locked, log.borrow().displacement(record.hold_end, 8.81331)),
-        "{error}"
-    );
-    let settings = &[
-        "backbone.C_from=0.45",
-        "backbone.C_to=0.15",
-        "backbone.points=3",
-        "phase_lock.lock.unlock_tolerance=1.5",
-    ];
+    let expected = log.borrow().displacement(record.hold_end, 8.81331);
+    assert!(is_near(locked, expected), "{error}");
+    let levels = ["backbone.C_from=0.45", "backbone.C_to=0.15", "backbone.points=3"];
+    let settings = &[&levels[..], &["phase_lock.lock.unlock_tolerance=1.5"]].concat();
     for silent in [false, true] {
         let (error, _) = ended(&frame(settings), silent, |rig, scene| {
             let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
@@ -267,14 +253,10 @@ fn results_of_a_force_test_are_in_newton_and_metres_at_the_sensor_and_are_read_a
     let keys: Vec<&str> = json["lock"].as_object().unwrap().keys().map(String::as_str).collect();
     let in_metres: Vec<_> = keys.iter().filter(|key| key.ends_with("_m")).collect();
     assert_eq!(in_metres, [&"A_m", &"u_A_m"], "{keys:?}");
-    assert!(
-        ["F_N", "u_F_N", "F_requested_N"].iter().all(|key| keys.contains(key)),
-        "{keys:?}"
-    );
-    assert!(
-        table(&record.samples, &scene.knowledge().target)
-            .starts_with("time,response [m/s²],reference [N],omega,E [N],")
-    );
+    let in_newton = ["F_N", "u_F_N", "F_requested_N"];
+    assert!(in_newton.iter().all(|key| keys.contains(key)), "{keys:?}");
+    let table = table(&record.samples, &scene.knowledge().target);
+    assert!(table.starts_with("time,response [m/s²],reference [N],omega,E [N],"));
 }
 
 #[test]
@@ -282,10 +264,8 @@ fn points_of_a_decay_are_displacements_at_the_sensor() {
     // The frame without its second mode, which would ring beside the decay.
     let second = "    { frequency = 9.3, damping = 0.006, shape = { left = 0.51252, right = -0.45 } },\n";
     let text = include_str!("../../../../scenes/frame.toml").replace(second, "");
-    let points = identified(&Scene::parse("one mode", &text, &[]).unwrap())
-        .unwrap()
-        .decay
-        .points;
+    let found = identified(&Scene::parse("one mode", &text, &[]).unwrap()).unwrap();
+    let points = found.decay.points;
     assert!(!points.is_empty());
     for point in points {
         let b = 0.01 * 0.45 / 0.51252;
@@ -296,20 +276,9 @@ fn points_of_a_decay_are_displacements_at_the_sensor() {
 /// The shaker on the cantilever, with a sensor of velocity in its middle.
 #[test]
 fn behind_a_shaker_a_motion_that_is_not_steady_is_stated_at_the_sensor_and_a_force_that_contradicts_in_newton() {
-    let text = include_str!("../../../../scenes/shaker-cantilever.toml")
-        .replace(
-            "tip = 0.51252, root = 0.04672",
-            "tip = 0.51252, middle = 0.17399, root = 0.04672",
-        )
-        .replace(
-            "tip = -0.51252, root = 0.20366",
-            "tip = -0.51252, middle = 0.36568, root = 0.20366",
-        )
-        .replace(
-            "tip = 0.51252, root = 0.36168",
-            "tip = 0.51252, middle = 0.01008, root = 0.36168",
-        )
-        .replace("sensor = \"tip\"", "sensor = \"middle\"");
+    let middle = "root = 0.04672 -> middle = 0.17399, root = 0.04672 ;; root = 0.20366 -> middle = 0.36568, root = 0.20366 ;; \
+                  root = 0.36168 -> middle = 0.01008, root = 0.36168 ;; sensor = \"tip\" -> sensor = \"middle\"";
+    let text = changed(include_str!("../../../../scenes/shaker-cantilever.toml"), middle);
     let velocity = "resonance.sensor_quantity=velocity".parse().unwrap();
     let scene = Scene::parse("middle", &text, &[velocity]).unwrap();
     let (log, mut n) = (RefCell::default(), 0.0);
