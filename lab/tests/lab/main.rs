@@ -41,6 +41,13 @@ fn json(line: &str) -> Value {
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
+/// All that a command prints, which succeeds.
+fn printed(line: &str) -> String {
+    let output = vines(line);
+    assert!(output.status.success(), "{line}: {output:?}");
+    text(&output)
+}
+
 /// All that a program has printed.
 fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
@@ -112,11 +119,7 @@ impl Running {
 fn wait_for_rows(file: &Path, rows: u64) {
     let began = Instant::now();
     while fs::metadata(file).map_or(0, |file| file.len()) < 100 * rows {
-        assert!(
-            began.elapsed() < Duration::from_secs(120),
-            "{} does not grow",
-            file.display()
-        );
+        assert!(began.elapsed() < Duration::from_secs(120), "{file:?} does not grow");
         sleep(Duration::from_millis(20));
     }
 }
