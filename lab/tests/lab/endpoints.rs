@@ -122,16 +122,15 @@ fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
 
 #[test]
 fn a_structure_with_a_shaker_gives_the_same_bits_across_the_network() {
-    let scene = format!(
-        "--scene {}/../scenes/shaker-cantilever.toml",
-        env!("CARGO_MANIFEST_DIR")
+    let scene = concat!(
+        "--scene ",
+        env!("CARGO_MANIFEST_DIR"),
+        "/../scenes/shaker-cantilever.toml"
     );
     let identified = |rig: &str| {
         let folder = tempfile::tempdir().unwrap();
-        let done = vines(&format!(
-            "identify --json {scene} --rig {rig} --out {}",
-            folder.path().display()
-        ));
+        let line = format!("identify --json {scene} --rig {rig}");
+        let done = vines(&format!("{line} --out {}", folder.path().display()));
         assert!(done.status.success(), "{done:?}");
         json(&done)
     };
@@ -261,23 +260,16 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
     // Recorded samples tell that the rig is driven, or that points of the backbone are measured. A later signal finds it so, too.
     let long = "identify --set=record.hold_periods=20000";
     let many = "backbone --set=backbone.C_from=0.6 --set=backbone.C_to=0.58 --set=backbone.points=2000";
+    let (zero, kept, step) = (
+        "interrupted by a signal; the drive is zero",
+        "points were measured before",
+        "--lock-step --silence 30",
+    );
     for (mode, command, (signal, code), samples, part) in [
-        (
-            "--silence 5",
-            long,
-            ("INT", 130),
-            1000,
-            "interrupted by a signal; the drive is zero",
-        ),
-        ("--lock-step --silence 30", long, ("TERM", 143), 1000, "interrupted"),
+        ("--silence 5", long, ("INT", 130), 1000, zero),
+        (step, long, ("TERM", 143), 1000, "interrupted"),
         // Between two points of a backbone, the points are kept.
-        (
-            "--lock-step --silence 30",
-            many,
-            ("INT", 130),
-            20_000,
-            "points were measured before",
-        ),
+        (step, many, ("INT", 130), 20_000, kept),
     ] {
         let rig = Server::start(&format!("rig --json {mode}"));
         let [folder, other] = [(); 2].map(|()| tempfile::tempdir().unwrap());

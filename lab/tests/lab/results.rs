@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use crate::{Running, fails, is_failure, vines, wait_for_rows, words};
+use crate::{Running, fails, is_failure, text, vines, wait_for_rows, words};
 
 /// A backbone of one level, within seconds.
 const SHORT: &str = "backbone --set=backbone.points=2 --set=backbone.C_to=0.6";
@@ -13,9 +13,8 @@ const SHORT: &str = "backbone --set=backbone.points=2 --set=backbone.C_to=0.6";
 /// The names in a folder, in order.
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> = entries
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
+    let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = names.collect();
     names.sort();
     names
 }
@@ -32,28 +31,15 @@ fn a_target_that_cannot_be_written_is_refused_as_wrong_usage_before_anything_mov
     }
     let below = format!("{a_file}/below");
     let silent = "--rig udp://127.0.0.1:9";
-    for command in [
-        &format!("identify {silent}"),
-        &format!("backbone {silent}"),
-        "map",
-        "report",
-        "pack",
-    ] {
+    let [identify, backbone] = ["identify", "backbone"].map(|command| format!("{command} {silent}"));
+    for command in [&identify, &backbone, "map", "report", "pack"] {
         for out in [&a_file, &below, &taken] {
             fails(&format!("{command} --out {out}"), 2, out);
         }
     }
-    for (command, option) in [
-        ("identify", "--record"),
-        ("fit x.csv", "--out"),
-        ("fit x.csv", "--figure"),
-    ] {
+    for command in ["identify --record", "fit x.csv --out", "fit x.csv --figure"] {
         for target in [&a_folder, &below] {
-            fails(
-                &format!("{command} {option} {target}"),
-                2,
-                &format!("cannot write {target}"),
-            );
+            fails(&format!("{command} {target}"), 2, &format!("cannot write {target}"));
         }
     }
     assert_eq!(names(folder.path()), ["file", "folder", "taken"], "nothing is left");
@@ -65,10 +51,8 @@ fn a_full_disk_costs_the_recording_but_not_the_result() {
     let folder = tempfile::tempdir().unwrap();
     let full = vines(&format!("{SHORT} --record /dev/full --out {}", folder.path().display()));
     let printed = String::from_utf8(full.stdout.clone()).unwrap();
-    assert!(
-        printed.contains("2 points in ") && printed.contains("tracked.csv"),
-        "{printed}"
-    );
+    let is_printed = printed.contains("2 points in ") && printed.contains("tracked.csv");
+    assert!(is_printed, "{printed}");
     let error = Output { stdout: Vec::new(), ..full };
     is_failure(&error, 1, "cannot write /dev/full: No space left");
 }
@@ -82,21 +66,16 @@ fn a_killed_run_leaves_a_valid_recording_and_a_folder_that_the_next_run_can_use(
     let endless = format!("identify --rig built-in --set=record.hold_periods=190000 --out {out} --record {file}");
     let mut endless = Running::start(&words(&endless));
     wait_for_rows(Path::new(&file), 1000);
-    fails(
-        &format!("{SHORT} --out {out}"),
-        2,
-        "another run of this program writes there",
-    );
+    let busy = "another run of this program writes there";
+    fails(&format!("{SHORT} --out {out}"), 2, busy);
     let twice = format!("{SHORT} --out {other} --record {file}");
     fails(&twice, 2, "another run is recording to it");
     endless.signal("KILL");
     drop(endless);
     let recorded = fs::read_to_string(&file).unwrap();
     let mut rows = recorded.lines();
-    assert_eq!(
-        rows.next(),
-        Some("time,response,reference,omega,E,phase_error,state,fault")
-    );
+    let head = "time,response,reference,omega,E,phase_error,state,fault";
+    assert_eq!(rows.next(), Some(head));
     // The system may cut the last write at the end of a page.
     let whole: Vec<&str> = rows.collect();
     let (_, whole) = whole.split_last().unwrap();
@@ -113,11 +92,8 @@ fn the_files_in_a_folder_are_of_one_run() {
     let results = ["tracked.csv", "tracked.json", "tracked.svg"];
     let run = |settings: &str| vines(&format!("{SHORT} {settings} --out {}", folder.path().display()));
     assert!(run("").status.success());
-    is_failure(
-        &run("--set=phase_lock.response_max=0.001"),
-        1,
-        "results of an earlier run are in",
-    );
+    let limited = run("--set=phase_lock.response_max=0.001");
+    is_failure(&limited, 1, "results of an earlier run are in");
     assert_eq!(names(folder.path()), ["interrupted.csv", "previous"]);
     assert_eq!(names(&folder.path().join("previous")), results);
     assert!(run("").status.success());
@@ -129,10 +105,7 @@ fn a_backbone_of_motions_that_never_settle_is_a_failure_with_the_levels_at_which
     let folder = tempfile::tempdir().unwrap();
     let levels = "--set=backbone.points=2 --set=backbone.C_from=0.1 --set=backbone.C_to=0.103";
     let below = vines(&format!("backbone {levels} --out {}", folder.path().display()));
-    assert!(
-        String::from_utf8_lossy(&below.stdout).contains("0 of 2 points"),
-        "{below:?}"
-    );
+    assert!(text(&below).contains("0 of 2 points"), "{below:?}");
     let error = Output { stdout: Vec::new(), ..below };
     is_failure(&error, 1, "in the ideal cavity it is stable for C from 0.13");
 }

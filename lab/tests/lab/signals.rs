@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -29,9 +29,8 @@ impl Running {
         let is_name = |name: io::Result<String>| name.is_ok_and(|name| name.trim() == "signals");
         wait_until("no thread waits for signals", || {
             let tasks = fs::read_dir(&tasks).into_iter().flatten().flatten();
-            tasks
-                .map(|task| fs::read_to_string(task.path().join("comm")))
-                .any(is_name)
+            let mut names = tasks.map(|task| fs::read_to_string(task.path().join("comm")));
+            names.any(is_name)
         });
     }
 
@@ -50,8 +49,7 @@ fn foreign(folder: &Path, name: &str, options: &str, variables: &[(&str, &str, &
     let mut compiler = Command::new("cc");
     compiler
         .args(["-O1", "-shared", "-fPIC", "-o"])
-        .arg(&library)
-        .arg(source);
+        .args([&library, &source]);
     assert!(compiler.args(words(options)).arg("-lm").status().unwrap().success());
     let mut rows = String::new();
     for (n, (name, causality, kind)) in variables.iter().enumerate() {
@@ -103,23 +101,9 @@ fn every_command_that_waits_ends_with_the_code_of_the_signal() {
     let pipe = folder.path().join("scene.toml");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     // Nobody writes the scene.
-    for (n, command) in [
-        "identify",
-        "backbone",
-        "check",
-        "orbit",
-        "orbit --response",
-        "structure",
-        "theory",
-        "map",
-        "report",
-        "fit points.csv",
-        "rig --listen 127.0.0.1:0",
-        "controller --listen 127.0.0.1:0",
-    ]
-    .into_iter()
-    .enumerate()
-    {
+    let commands = "identify, backbone, check, orbit, orbit --response, structure, theory, map, report, fit points.csv, rig --listen 127.0.0.1:0, \
+                    controller --listen 127.0.0.1:0";
+    for (n, command) in commands.split(", ").enumerate() {
         let (signal, name, code) = [("INT", "SIGINT", 130), ("TERM", "SIGTERM", 143), ("HUP", "SIGHUP", 129)][n % 3];
         let line = format!("{command} --scene {}", pipe.display());
         let program = Running::start_with_default_signals(&words(&line));
@@ -181,13 +165,8 @@ fn hung(line: &str, folder: &Path, signal: &str) -> (Output, bool) {
     let place = tempfile::tempdir().unwrap();
     let mut command = Command::new(crate::PROGRAM);
     command.args(words(line)).current_dir(place.path());
-    command
-        .env("HANGS", &hangs)
-        .env("ZEROED", &zeroed)
-        .env("TMPDIR", &unpacked);
-    command
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped());
+    command.envs([("HANGS", &hangs), ("ZEROED", &zeroed), ("TMPDIR", &unpacked)]);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let program = Running(command.spawn().unwrap(), place);
     wait_until("no FMU hangs", || hangs.exists());
     let ended = program.ended_by(signal);
@@ -198,17 +177,12 @@ fn hung(line: &str, folder: &Path, signal: &str) -> (Output, bool) {
 #[test]
 fn an_fmu_that_hangs_and_ignores_signals_does_not_keep_the_program_and_zero_is_commanded_where_the_rig_answers() {
     let no = "; zero could not be commanded, because the rig does not answer: switch the drive off at the rig";
+    let deaf = Some("-DHANG=900 -DDEAF");
     for (rig, controller, signal, code, message) in [
         // The rig answers, and the controller does not.
         (Some(""), Some("-DHANG=900"), "INT", 130, "SIGINT; the drive is zero"),
-        (
-            Some(""),
-            Some("-DHANG=900 -DDEAF"),
-            "TERM",
-            143,
-            "SIGTERM; the drive is zero",
-        ),
-        (None, Some("-DHANG=900 -DDEAF"), "INT", 130, "SIGINT\n"),
+        (Some(""), deaf, "TERM", 143, "SIGTERM; the drive is zero"),
+        (None, deaf, "INT", 130, "SIGINT\n"),
         (Some("-DHANG=900"), None, "INT", 130, no),
         (Some("-DHANG=900"), Some("-DDEAF"), "TERM", 143, no),
     ] {
@@ -242,10 +216,8 @@ fn a_rig_that_falls_silent_does_not_keep_the_program_which_says_that_zero_could_
     rig.signal("STOP");
     let ended = client.ended_by("TERM");
     assert_eq!(ended.status.code(), Some(143), "{ended:?}");
-    assert!(
-        text(&ended).contains("zero could not be commanded, because the rig does not answer"),
-        "{ended:?}"
-    );
+    let said = "zero could not be commanded, because the rig does not answer";
+    assert!(text(&ended).contains(said), "{ended:?}");
 }
 
 #[test]
