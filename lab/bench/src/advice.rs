@@ -61,16 +61,14 @@ pub fn is_hit_at_once(scene: &Scene, samples: &[Sample]) -> bool {
     is_simulated && scene.resonance.sensor_quantity != Measurand::Displacement && scene.start.dq2 != 0.0
 }
 
-/// Change of the phase target, degrees, by which the frequency of an orbit changes without rounding and without a bend.
-const TURN: f64 = 0.02;
-
 /// Whether a phase loop can hold an orbit of a scene under its drive. Its control is integral: the response has to lag more at a higher frequency, as it
 /// does on one oscillator. `d` has the numbers of the driven mode.
 pub fn can_be_held(scene: &Scene, d: &Dimensionless, orbit: &Orbit) -> bool {
     if scene.structure.is_none() {
         return true;
     }
-    let [before, after] = [-TURN, TURN].map(|turn| {
+    // Degrees by which the frequency of an orbit changes without rounding and without a bend.
+    let [before, after] = [-0.02, 0.02].map(|turn| {
         let mut scene = scene.clone();
         scene.controller.phase_target += turn;
         let sigmas = phase_resonant(&scene, d).into_iter().map(|orbit| orbit.sigma);

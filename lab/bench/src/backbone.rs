@@ -60,7 +60,6 @@ impl LevelPoint {
     /// Why the point has not settled, on a rig whose motions have mirror images or not; `None` if it has.
     pub fn unsettled(&self, is_symmetric: bool) -> Option<String> {
         Some(match self.regime {
-            _ if self.settled => return None,
             _ if !self.reached => "the response does not reach the level".into(),
             _ if is_off_target(self.at.phase_error_deg.to_radians(), self.at.u_phase_deg.to_radians()) => {
                 format!(
@@ -68,6 +67,7 @@ impl LevelPoint {
                     self.at.phase_error_deg
                 )
             }
+            // An irregular motion can seem steady for a while; where motions have mirror images, an asymmetric one is no point of this backbone.
             Regime::Other => "the motion is irregular".into(),
             Regime::Asymmetric if is_symmetric => "the motion is asymmetric".into(),
             _ => format!("the motion is not steady: {}", self.unsteady?),
@@ -216,39 +216,21 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
             .map_or(0, |_| self.plan.knowledge.samples(2.5));
         run.samples.drain(..run.samples.len().saturating_sub(kept));
         let criterion = self.criterion();
-        let held = self.script.hold(level, &criterion)?;
-        let clipped_percent = self.script.run.clipped_percent(clipped);
-        Ok(LevelPoint {
-            clipped_percent,
-            periods: self.script.run.periods - start,
-            ..self.point(level, &held)
-        })
-    }
-
-    /// The point of a level, m.
-    fn point(&self, level: f64, held: &Level) -> LevelPoint {
-        let (knowledge, Level { estimate, cycles }) = (&self.plan.knowledge, held);
-        let averaged = self.script.averaged(estimate, cycles);
+        let Level { estimate, cycles } = self.script.hold(level, &criterion)?;
+        let (run, knowledge) = (&self.script.run, &self.plan.knowledge);
+        let averaged = self.script.averaged(&estimate, &cycles);
         let [base, at] = estimate.at;
         let omega = at.value;
-        let regime = self.script.regime(estimate, cycles);
-        let reached = is_reached(estimate.response, level);
-        LevelPoint {
+        let mut point = LevelPoint {
             at: ResonancePoint::new([estimate.response, base, at, estimate.phase_error], knowledge),
             // The level as a person would write it.
             level: (1e9 * level / knowledge.numbers.b).round() / 1e9,
-            periods: 0.0,
+            periods: run.periods - start,
             averaged: estimate.periods,
-            // An irregular motion can seem steady for a while; where motions have mirror images, an asymmetric one is no point of this
-            // backbone.
-            settled: reached
-                && regime != Regime::Other
-                && (regime != Regime::Asymmetric || !knowledge.is_symmetric)
-                && estimate.unsteady.is_none()
-                && !is_off_target(estimate.phase_error.value, estimate.phase_error.uncertainty),
-            reached,
+            settled: false,
+            reached: is_reached(estimate.response, level),
             unsteady: estimate.unsteady,
-            regime,
+            regime: self.script.regime(&estimate, &cycles),
             regime_by_impacts: averaged[0]
                 .ground_truth
                 .map(|_| classify(averaged, knowledge.sample_time, omega).1),
@@ -256,9 +238,11 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
             drive_harmonics: knowledge
                 .shaker
                 .and_then(|_| drive_harmonics(averaged, knowledge, omega)),
-            clipped_percent: None,
+            clipped_percent: run.clipped_percent(clipped),
             command_v: mean_command(averaged, knowledge),
-        }
+        };
+        point.settled = point.unsettled(knowledge.is_symmetric).is_none();
+        Ok(point)
     }
 
     /// The criterion for a settled point.

@@ -167,11 +167,6 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
 
 // Distance of measured points from the exact backbone.
 
-/// Orbits of the curve of one oscillator: the error of the polygon is below 1e-5.
-const OSCILLATOR_ORBITS: usize = 3000;
-/// Largest particle speed of the curve: beyond symmetry breaking.
-const SPEED_MAX: f64 = 1.35;
-
 /// A curve to draw: sigma and C of its points, and whether the motion is stable or neutral there.
 pub type DrawnCurve = Vec<([f64; 2], bool)>;
 
@@ -213,7 +208,8 @@ fn place(orbit: &Orbit) -> Place {
 
 /// The places of a curve from its smallest response towards faster particles.
 fn right_of_fold(curve: &[Orbit]) -> Vec<Place> {
-    let mut orbits: Vec<&Orbit> = curve.iter().filter(|orbit| orbit.b < SPEED_MAX).collect();
+    // Symmetry breaking is at slower particles.
+    let mut orbits: Vec<&Orbit> = curve.iter().filter(|orbit| orbit.b < 1.35).collect();
     orbits.sort_by(|one, other| one.b.total_cmp(&other.b));
     let fold = (0..orbits.len()).min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c));
     let rising = orbits.iter().skip(fold.unwrap_or(0));
@@ -244,10 +240,8 @@ impl ExactCurve {
             curve.points.retain(|orbit| orbit.b >= flow.manifold.b_min());
             curve.points
         };
-        let curves: Vec<_> = backbone(scene, None, OSCILLATOR_ORBITS)
-            .into_iter()
-            .map(beyond_fold)
-            .collect();
+        // The error of a polygon of so many orbits is below 1e-5.
+        let curves: Vec<_> = backbone(scene, None, 3000).into_iter().map(beyond_fold).collect();
         let middle = flow.backbone_at(0.5 * (flow.manifold.b_min() + B_SYMMETRY_BREAKING));
         Self::nearest(ExactOrbits::of_oscillator(scene), &curves, [middle.sigma, middle.c])
     }
@@ -304,9 +298,9 @@ impl ExactCurve {
             return Some(Distance { nearest: polygon, sigma: None, g: None });
         };
         let differences = [sigma - same.sigma, g - same.g];
-        // The curve there, as straight as it is over the difference.
+        // The curve there, as straight as it is over the difference; its direction from an orbit beside.
         let largest = differences[0].abs().max(differences[1].abs());
-        let beside = at(c * (1.0 + DIRECTION_STEP), [same.sigma, same.b]);
+        let beside = at(c * (1.0 + 1e-5), [same.sigma, same.b]);
         let nearest = beside.map_or(polygon, |beside| {
             let from = [same.c, same.sigma, same.g];
             let tangent = [beside.c - same.c, beside.sigma - same.sigma, beside.g - same.g];
@@ -321,9 +315,6 @@ impl ExactCurve {
         })
     }
 }
-
-/// Relative difference in C of the orbit that gives the direction of the curve.
-const DIRECTION_STEP: f64 = 1e-5;
 
 /// The places, interpolated linearly at their first value `c`, in the last pair around it.
 fn at<const N: usize>(places: &[[f64; N]], c: f64) -> Option<[f64; N]> {

@@ -139,57 +139,15 @@ pub enum ExperimentError {
     },
     #[error("phase or drive are not as asked: {departure}. The run ended with: {error}")]
     OtherThanAsked { departure: String, error: Box<Self> },
-    #[error(
-        "the controller does not release the drive: {periods:.1} periods after `active` became false, it commands {commanded}. A ramp may take no longer, \
-         because a free response falls to {} % in this time; the drive is off",
-        100.0 * DECAYED
-    )]
-    NotReleased {
-        /// Natural periods.
-        periods: f64,
-        commanded: String,
-    },
-    #[error(
-        "the controller drives again: {periods:.1} periods after it released the drive, it commands {commanded}; the drive is off"
-    )]
-    DrivesAgain {
-        /// Natural periods.
-        periods: f64,
-        commanded: String,
-    },
     #[error("the scene has no drive, so that nothing can lock")]
     NoDrive,
-    #[error("the controller answered {name} = {value}; it must be {allowed}. The drive is off")]
-    Command {
-        name: &'static str,
-        value: Quantity,
-        allowed: &'static str,
-    },
-    #[error(
-        "the controller asked for {amplitude}, and {} allows {limit}; the drive is off. Its output E is {}",
-        key("amplitude_max"),
-        match per_metre.unit {
-            "N" => format!("the force over {per_metre}/m, in m"),
-            _ => "the amplitude of the base in metres".into(),
-        }
-    )]
-    DriveTooLarge {
-        amplitude: Quantity,
-        limit: Quantity,
-        /// The drive for which the controller's output is 1 m.
-        per_metre: Quantity,
-    },
+    #[error("the controller {0}; the drive is off")]
+    Refused(String),
     #[error(
         "the response read {response}, and {} allows {limit}, but the controller did not stop; the drive is off",
         key("response_max")
     )]
     ResponseTooLarge { response: Quantity, limit: String },
-    #[error(
-        "the controller asked for omega = {} rad/s; the scene allows {} to {} rad/s ({}, {}), and a factor of 2 pi lies between. omega is an \
-         angular frequency in rad/s, not in Hz; the drive is off",
-        short(*omega), short(allowed[0]), short(allowed[1]), key("omega_min"), key("omega_max")
-    )]
-    Hertz { omega: f64, allowed: [f64; 2] },
 }
 
 /// Runs the whole experiment. `progress` receives the stage, the samples taken in it, and their largest number.
@@ -212,19 +170,13 @@ pub fn run_into(
 ) -> Result<Record, ExperimentError> {
     let mut report = |stage: Stage, taken| progress(stage, taken, stage.samples(plan));
     let mut bench = ControlLoop::new(rig, controller, plan, &plan.lock, samples, &mut report)?;
-    let conducted = match conduct(&mut bench) {
-        Ok(conducted) => conducted,
-        Err(error) => {
-            bench.switch_off();
-            return Err(bench.beside_what_was_asked(error));
-        }
-    };
-    drop(bench);
-    let samples = std::mem::take(samples);
-    Ok(Record { samples, ..conducted })
+    conduct(&mut bench).map_err(|error| {
+        bench.switch_off();
+        bench.beside_what_was_asked(error)
+    })
 }
 
-/// The experiment from the search to the end of the decay; the record is without its samples.
+/// The experiment from the search to the end of the decay.
 fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut ControlLoop<'_, R, C>,
 ) -> Result<Record, ExperimentError> {
@@ -244,7 +196,7 @@ fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
     }
     Ok(Record {
         sample_time: plan.knowledge.sample_time,
-        samples: Vec::new(),
+        samples: std::mem::take(bench.samples),
         settled,
         held,
         hold_end,
@@ -255,9 +207,7 @@ fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
 
 // Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
 
-/// Slowest time constant of the loops, periods.
-pub(crate) const SLOWEST_LOOP: f64 = 5.0;
-/// Periods within which the loops and the particle follow a change of their setpoint.
+/// Periods within which the loops, whose time constant is five periods at most, and the particle follow a change of their setpoint.
 pub(crate) const FOLLOWED: usize = 8;
 /// Observations in succession that are not taken for chance: periods, or legs of the search.
 pub(crate) const CONFIRMED: u32 = 3;
@@ -362,7 +312,9 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             let is_off = is_off(command.drive);
             if stage == Stage::Decaying && !is_off {
                 let commanded = drive_in_words(command.drive, plan);
-                return Err(ExperimentError::DrivesAgain { periods: since_release, commanded });
+                return Err(ExperimentError::Refused(format!(
+                    "drives again: {since_release:.1} periods after it released the drive, it commands {commanded}"
+                )));
             }
             if (active || !is_off) && !is_latched(&command) {
                 guard(config, &target, sample.sensors.response, command.drive)?;
@@ -403,8 +355,13 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
                 return Ok(self.taken - 1);
             }
         }
-        let commanded = drive_in_words(self.last.drive, self.plan);
-        Err(ExperimentError::NotReleased { periods: self.natural_periods(ramp), commanded })
+        Err(ExperimentError::Refused(format!(
+            "does not release the drive: {:.1} periods after `active` became false, it commands {}. A ramp may take no longer, because a free \
+             response falls to {} % in this time",
+            self.natural_periods(ramp),
+            drive_in_words(self.last.drive, self.plan),
+            100.0 * DECAYED
+        )))
     }
 
     /// Samples so far, and of these the ones with the command of a shaker at the limit of its amplifier.
@@ -452,13 +409,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         Cycle::of(&self.samples[begin..], self.sample_time, turns * TAU, target)
     }
 
-    fn advance(&mut self, drive: Drive) -> Result<(), ExperimentError> {
-        self.driven = true;
-        self.rig.advance(drive, self.sample_time)?;
-        self.driven = !is_off(drive);
-        Ok(())
-    }
-
     /// Follows the controller's ramp after a fault until the drive is off.
     fn ramp_down(&mut self, mut command: Command) -> Result<(), ExperimentError> {
         while command.drive.amplitude > 0.0 {
@@ -468,7 +418,8 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             let falling = Some(asked.drive).filter(|drive| falls(&drive.amplitude));
             let reference = self.plan.knowledge.target.units.reference;
             command = checked(Command { drive: falling.unwrap_or_default(), ..asked }, reference)?;
-            self.advance(command.drive)?;
+            self.rig.advance(command.drive, self.sample_time)?;
+            self.driven = !is_off(command.drive);
         }
         Ok(())
     }
@@ -541,16 +492,28 @@ fn guard(config: &Config, target: &Target, response: f64, drive: Drive) -> Resul
     if let Some(limit) = beyond(amplitude, amplitude_max) {
         let [amplitude, limit, per_metre] =
             [amplitude, limit, 1.0].map(|metres| target.units.reference.quantity(metres));
-        return Err(ExperimentError::DriveTooLarge { amplitude, limit, per_metre });
+        let output = match per_metre.unit {
+            "N" => format!("the force over {per_metre}/m, in m"),
+            _ => "the amplitude of the base in metres".into(),
+        };
+        return Err(ExperimentError::Refused(format!(
+            "asked for {amplitude}, and {} allows {limit}. Its output E is {output}",
+            key("amplitude_max")
+        )));
     }
     if let Some(limit) = beyond(response.abs(), response_max) {
         let (response, limit) = (target.quantity(0, response), limit_in_words(limit, target));
         return Err(ExperimentError::ResponseTooLarge { response, limit });
     }
-    let allowed = [omega_min, omega_max];
     let is_allowed = |omega: f64| (omega_min..=omega_max).contains(&omega);
     if amplitude > 0.0 && !is_allowed(omega) && (is_allowed(omega * TAU) || is_allowed(omega / TAU)) {
-        return Err(ExperimentError::Hertz { omega, allowed });
+        let [asked, least, most] = [omega, omega_min, omega_max].map(short);
+        return Err(ExperimentError::Refused(format!(
+            "asked for omega = {asked} rad/s; the scene allows {least} to {most} rad/s ({}, {}), and a factor of 2 pi lies between. omega is an \
+             angular frequency in rad/s, not in Hz",
+            key("omega_min"),
+            key("omega_max")
+        )));
     }
     Ok(())
 }
@@ -566,11 +529,10 @@ fn checked(command: Command, reference: Unit) -> Result<Command, ExperimentError
         ("phase_error", angular(command.phase_error.unwrap_or(0.0), "rad"), true),
     ] {
         if !(value.value.is_finite() && (is_signed || value.value >= 0.0)) {
-            let allowed = match is_signed {
-                true => "a finite number",
-                false => "a finite number, 0 or above",
-            };
-            return Err(ExperimentError::Command { name, value, allowed });
+            let least = if is_signed { "" } else { ", 0 or above" };
+            return Err(ExperimentError::Refused(format!(
+                "answered {name} = {value}; it must be a finite number{least}"
+            )));
         }
     }
     Ok(command)

@@ -196,10 +196,7 @@ fn linear_verdicts(
             [false, true] => ParticleState::Free,
             _ => ParticleState::Unknown,
         };
-        LinearVerdict {
-            linear: MeasuredLinear { particle, ..*linear },
-            rises: found.rises,
-        }
+        LinearVerdict { linear: MeasuredLinear { particle, ..*linear }, ..found }
     };
     Ok(linear.iter().map(verdict).collect())
 }

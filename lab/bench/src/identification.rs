@@ -117,11 +117,7 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     let repeats = subharmonic(record.hold(), &knowledge, TAU * f_hz);
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so. So is one without symmetry where
     // there may be no cavity.
-    let is_expected = match lock.regime {
-        Regime::Symmetric | Regime::Unresolved => true,
-        Regime::Asymmetric => !knowledge.is_symmetric || silent.is_some(),
-        _ => false,
-    };
+    let is_expected = is_wanted(lock.regime, knowledge.is_symmetric && silent.is_none());
     // Another phase or drive has another motion, of which the wanted one says nothing.
     if (!is_expected || repeats.is_some())
         && let Some(departure) = departure(record.hold(), plan)
@@ -146,6 +142,11 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
         decay: decay_points(record, &knowledge, DECAY_WINDOW),
         base_after_release: base_at_rest(record, &knowledge).err(),
     })
+}
+
+/// Whether a regime is the wanted one, as far as noise shows it; where motions have no mirror images (not `is_symmetric`), also the asymmetric one.
+pub(crate) fn is_wanted(regime: Regime, is_symmetric: bool) -> bool {
+    matches!(regime, Regime::Symmetric | Regime::Unresolved) || regime == Regime::Asymmetric && !is_symmetric
 }
 
 /// Largest number of harmonics that are fitted: a bound of the work.
@@ -259,8 +260,6 @@ const MOST_EVALUATED: f64 = 240.0;
 const SPREAD: f64 = 0.008;
 /// Smallest disturbance of a motion, relative to the response: less than the noise of any rig.
 const SMALLEST_DISTURBANCE: f64 = 1e-6;
-/// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
-pub(crate) const PHASE_RANGE: f64 = 0.1;
 
 /// The locked point of a record; `None` without a motion.
 fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
@@ -268,7 +267,9 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
     let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
     let held = Cycle::all(hold, dt, knowledge.target);
-    let cycles = before_release(record, knowledge);
+    let most = knowledge.samples(MOST_EVALUATED).max(hold.len());
+    let last = &record.samples[record.hold_end.saturating_sub(most)..record.hold_end];
+    let cycles = Cycle::all(last, dt, knowledge.target);
     let approach = approached(&cycles, &held);
     let largest = mean(held.iter().map(Cycle::amplitude));
     // The balances say which drive and frequency belong to a response, whether it rests or not.
@@ -329,14 +330,7 @@ pub(crate) fn mean_command(samples: &[Sample], knowledge: &Knowledge) -> Option<
     Some(mean(samples.iter().map(|sample| sample.shaker_command)))
 }
 
-/// The last periods before the release.
-fn before_release(record: &Record, knowledge: &Knowledge) -> Vec<Cycle> {
-    let most = knowledge.samples(MOST_EVALUATED);
-    let samples = &record.samples[record.hold_end.saturating_sub(most.max(record.hold().len()))..record.hold_end];
-    Cycle::all(samples, record.sample_time, knowledge.target)
-}
-
-/// Those with about the amplitude and the drive of the hold; at least as many as the hold has, and as a level needs.
+/// The cycles with about the amplitude and the drive of the hold; at least as many as the hold has, and as a level needs.
 fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
     let near = |value: fn(&Cycle) -> f64| {
         let values: Vec<f64> = held.iter().map(value).collect();
@@ -344,7 +338,8 @@ fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
         move |cycle: &Cycle| (value(cycle) - level).abs() <= (SPREAD * level).max(4.0 * scatter)
     };
     let (response, drive) = (near(Cycle::amplitude), near(|cycle| cycle.base.norm()));
-    let is_near = |cycle: &&Cycle| response(cycle) && drive(cycle) && cycle.phase_error.abs() <= PHASE_RANGE;
+    // The balances are of the first order in the phase error.
+    let is_near = |cycle: &&Cycle| response(cycle) && drive(cycle) && cycle.phase_error.abs() <= 0.1;
     let near = cycles.iter().rev().take_while(is_near).count();
     let fewest = held.len().max(2 * ResonanceFit::FEWEST);
     &cycles[cycles.len() - near.max(fewest).min(cycles.len())..]
@@ -353,8 +348,7 @@ fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
 /// Mean phase error over the hold, rad.
 fn phase_error(held: &[Cycle], knowledge: &Knowledge) -> Estimate {
     let LevelEstimate { response, phase_error, at: [base, _], .. } = LevelEstimate::means(held);
-    let [noise, base_noise] =
-        [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
+    let [noise, base_noise] = Cycle::noise_of(held, false).map(|noise| noise / (held.len() as f64).sqrt());
     let mut phase_noise = (noise / response.value).hypot(base_noise / base.value);
     // Behind a shaker noise of the readings turns the force itself, by more than that noise.
     if knowledge.shaker.is_some() {

@@ -10,8 +10,6 @@ use vines_scene::plan::DECAYED;
 
 /// Impacts that are kept to determine the regime from.
 const IMPACTS_KEPT: usize = 40;
-/// Periods without an impact after which there are none.
-const QUIET: f64 = 20.0;
 /// Smallest number of impacts that a regime is determined from.
 const FEWEST_IMPACTS: usize = 12;
 
@@ -39,7 +37,8 @@ impl LastImpacts {
     /// Their regime at the phase `now`, rad, as it is determined in an experiment.
     pub fn regime(&self, now: f64) -> Regime {
         let since = self.0.last().map_or(now, |last| now - last.time);
-        if since > QUIET * TAU {
+        // As many impacts are kept, two per period.
+        if since > 0.5 * IMPACTS_KEPT as f64 * TAU {
             return Regime::NoImpacts;
         }
         if self.0.len() < FEWEST_IMPACTS {

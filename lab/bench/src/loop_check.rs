@@ -123,15 +123,9 @@ fn at_share(rig: &mut (impl Rig + ?Sized), plan: &Plan, share: f64, waits: usize
     if let Some(stated) = &plan.knowledge.shaker {
         return shaker::check(rig, plan, stated, share);
     }
-    let (omega, amplitude, step) = (
-        plan.lock.omega_start,
-        share * plan.amplitude,
-        plan.knowledge.sample_time,
-    );
-    let target = plan.knowledge.target;
-    let mut rig = Scaled::new(rig, target);
-    let mut rig = OpenLoop::new(&mut rig, target, step);
-    let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
+    let (omega, amplitude) = (plan.lock.omega_start, share * plan.amplitude);
+    let mut rig = OpenLoop::new(rig, plan);
+    let samples = |periods: usize| (periods as f64 * TAU / (omega * plan.knowledge.sample_time)).round() as usize;
     let [quiet, driven] = CHECK_PERIODS.map(samples);
     let expected = expected(plan).map(|per_drive| per_drive * amplitude);
     let enough = expected.map(|phasor| NOISE * phasor.norm());
@@ -394,7 +388,7 @@ const WAIT: usize = 10;
 
 /// A rig whose loop is open, and what it has read: the phase of its oscillator, rad, response and base.
 struct OpenLoop<'a, R: ?Sized> {
-    rig: &'a mut R,
+    rig: Scaled<'a, R>,
     target: Target,
     step: f64,
     phase: f64,
@@ -403,11 +397,11 @@ struct OpenLoop<'a, R: ?Sized> {
 }
 
 impl<'a, R: Rig + ?Sized> OpenLoop<'a, R> {
-    fn new(rig: &'a mut R, target: Target, step: f64) -> Self {
+    fn new(rig: &'a mut R, plan: &Plan) -> Self {
         Self {
-            rig,
-            target,
-            step,
+            rig: Scaled::new(rig, plan.knowledge.target),
+            target: plan.knowledge.target,
+            step: plan.knowledge.sample_time,
             phase: 0.0,
             readings: Vec::new(),
             has_base: false,

@@ -75,16 +75,13 @@ impl Survey {
     }
 }
 
-/// Orbits of the longest stable stretch of a backbone that are compared with those under a sine.
-const COMPARED: usize = 9;
-
-/// Orbits of this backbone behind the scene's shaker, and under a pure sine; `None` without a shaker.
+/// Nine orbits, at most, of the longest stable stretch of this backbone behind the scene's shaker, and under a pure sine; `None` without a shaker.
 fn behind_shaker(scene: &Scene, backbone: &[StructureBranch]) -> Option<Vec<BehindShaker>> {
     let (structure, shaker) = scene.shaken()?;
     let alone = scene.orbits_of(&shaker.alone);
     let stretches = backbone.iter().flat_map(StructureBranch::stable).map(|(run, _)| run);
     let run = stretches.max_by_key(|run| run.len())?;
-    let mut orbits: Vec<&StructureOrbit> = run.iter().step_by(run.len().div_ceil(COMPARED)).collect();
+    let mut orbits: Vec<&StructureOrbit> = run.iter().step_by(run.len().div_ceil(9)).collect();
     orbits.sort_by(|one, other| one.response.total_cmp(&other.response));
     let compared = |orbit: &StructureOrbit| {
         // The impulses of two impacts per period, as a force.

@@ -16,9 +16,9 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 
-use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, Stage};
+use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
 use crate::identification::{
-    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, SAME, Unsteady, is_another,
+    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, SAME, Unsteady, is_another, is_wanted,
     regime_by_response, regime_of_leg, subharmonic, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
@@ -248,11 +248,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
 
     /// Whether a motion is the one that is wanted, as far as noise shows it: where motions have no mirror images, it is asymmetric.
     fn is_symmetric(&self, regime: Regime) -> bool {
-        match regime {
-            Regime::Symmetric | Regime::Unresolved => true,
-            Regime::Asymmetric => !self.knowledge.is_symmetric,
-            _ => false,
-        }
+        is_wanted(regime, self.knowledge.is_symmetric)
     }
 
     /// Whether the motion is of this kind also at rest, at its setpoint. It takes twice as long as a leg to come to rest.
@@ -454,8 +450,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// The move changes what rings by its own share at most, of which less than the precision is left.
     fn followed(&self, level: f64) -> usize {
         let Knowledge { shaker, rings, target, .. } = self.knowledge;
-        // Both roots of the control of a shaker are at half of its bandwidth.
-        let of_control = |path: ShakerPath| FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * path.speed);
+        // Both roots of the control of a shaker are at half of its bandwidth; the loops follow with a time constant of five periods.
+        let of_control = |path: ShakerPath| FOLLOWED as f64 / 5.0 / (PI * BANDWIDTH * path.speed);
         let of_control = shaker.map_or(0.0, of_control).min(LONGEST_SETTLING as f64).ceil();
         let share = (level / self.here()[0] - 1.0).abs() / self.run.plan.precision;
         // In these periods the pole that rings longest falls by a factor of e.

@@ -338,7 +338,11 @@ impl Recording {
     /// wrong sign.
     fn plausible(&self, knowledge: &Knowledge) -> Result<(), RecordingError> {
         let Self { origin, channels: [response, drive], .. } = self;
-        let (hertz, strongest, rate) = (knowledge.linear.omega0 / TAU, self.strongest(), 1.0 / self.sample_time);
+        let middle = mean(self.response.iter().copied());
+        let centred: Vec<f64> = self.response.iter().map(|value| value - middle).collect();
+        let rate = 1.0 / self.sample_time;
+        let [hertz, strongest] =
+            [knowledge.linear.omega0, rate * Line::strongest(&centred).turn].map(|omega| omega / TAU);
         let [of_response, of_base] = [0, 1].map(|channel| self.fundamentals(channel, knowledge));
         let pairs = || of_response.iter().zip(&of_base);
         let turned: Complex64 = of_response
@@ -383,13 +387,6 @@ impl Recording {
             "{origin}: fewer than thirty periods show symmetric 1:1 impacts of the particle that the scene describes (found: {found}). Record held \
              levels, a slow sweep or a decay above the fold, and give the scene that was recorded: f0 within 1 %, b within 10 %, masses within 15 %"
         ))
-    }
-
-    /// Frequency of the strongest oscillation at the end of the response, Hz.
-    fn strongest(&self) -> f64 {
-        let middle = mean(self.response.iter().copied());
-        let centred: Vec<f64> = self.response.iter().map(|value| value - middle).collect();
-        Line::strongest(&centred).turn / (TAU * self.sample_time)
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) fn departure(samples: &[Sample], plan: &Plan) -> Option<String> {
     if cycles.len() < ResonanceFit::FEWEST {
         return None;
     }
-    let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
+    let [noise, base_noise] = Cycle::noise_of(&cycles, false);
     let measured = LevelEstimate::means(&cycles);
     let [drive, omega] = measured.at;
     let requested = plan.requested(omega.value);

@@ -79,9 +79,6 @@ pub struct DecayPoints {
 
 /// Window of the fit along the decay, periods of the motion: shorter ones have more noise, longer ones blur the end (studies/decay.rs).
 pub const DECAY_WINDOW: f64 = 2.5;
-/// Length of a window with Hann's weights over one without: three periods. It averages the frequency over less time than one without weights, whose
-/// average has the second moment L²/20, and 0.026 L² with Hann's weights: as long a time would take 1.38 (validation/shaker_decay.csv).
-const HANN: f64 = 1.2;
 /// Points per period along the decay.
 pub(crate) const PER_PERIOD: f64 = 8.0;
 /// Smallest loss of amplitude by the impacts of a 1:1 motion, over the loss at the release: with the speed of the particle, it changes by a third
@@ -110,13 +107,14 @@ pub fn decay_points(record: &Record, knowledge: &Knowledge, window: f64) -> Deca
         f64::INFINITY
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
-    // A pole nearer than the main lobe of the window, over 2 pi and its length and wider by 1 because of the amplitude's second degree, looks like a
-    // part of the fundamental.
-    let (terms, window, lobe) = match knowledge.shaker {
-        Some(_) => (BEHIND_SHAKER, HANN * window, 3.0),
-        None => (DECAY_TERMS, window, 2.0),
+    let terms = if knowledge.shaker.is_some() {
+        BEHIND_SHAKER
+    } else {
+        DECAY_TERMS
     };
-    if knowledge.nearest_pole * window / omega < lobe {
+    let window = terms.length * window;
+    // A pole nearer than the main lobe of the window looks like a part of the fundamental.
+    if knowledge.nearest_pole * window / omega < terms.lobe {
         return none(DecayEnd::OtherMode);
     }
     let mut windows = fitted(&values, [dt, window], omega, terms);
@@ -293,6 +291,11 @@ struct Terms {
     harmonics: &'static [Option<usize>],
     /// Whether residuals have the weights of Hann's window, in which what is not fitted leaks least into the fundamental.
     is_hann: bool,
+    /// Length of the window over one without weights. With Hann's weights it averages the frequency over less time: the average has the second moment
+    /// 0.026 L², and L²/20 without weights, so that as long a time would take 1.38 (validation/shaker_decay.csv).
+    length: f64,
+    /// Main lobe of the window, over 2 pi and its length, and wider by 1 because of the amplitude's second degree.
+    lobe: f64,
 }
 
 /// A constant, and harmonics 1 and 3 with drift.
@@ -300,6 +303,8 @@ const DECAY_TERMS: Terms = Terms {
     trend: 0,
     harmonics: &[Some(2), None, Some(1)],
     is_hann: false,
+    length: 1.0,
+    lobe: 2.0,
 };
 /// A shaker that is released returns slowly, a sensor at the cavity sees the walls' impulses, and other modes are free: a trend, harmonics up to 9,
 /// and Hann's window.
@@ -307,10 +312,9 @@ const BEHIND_SHAKER: Terms = Terms {
     trend: 2,
     harmonics: &[Some(2), None, Some(1), None, Some(1), None, Some(1), None, Some(1)],
     is_hann: true,
+    length: 1.2,
+    lobe: 3.0,
 };
-
-/// Number of fits, each about the frequency that the fit before found; each reduces the error by orders of magnitude.
-const FREQUENCY_FITS: usize = 6;
 
 /// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
 /// with linear drift, and a constant.
@@ -338,7 +342,8 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
     // Half a window, s.
     let half = middle * sample_time;
     let (mut omega, mut last) = (omega, None);
-    for _ in 0..FREQUENCY_FITS {
+    // Each fit about the frequency that the fit before found reduces the error by orders of magnitude.
+    for _ in 0..6 {
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();

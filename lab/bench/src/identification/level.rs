@@ -101,15 +101,10 @@ impl Criterion {
 
     /// Largest uncertainty over the largest allowed.
     fn size(&self, estimate: &LevelEstimate) -> f64 {
-        let allowed = self.allowed(estimate.at[0].value);
-        let [base, omega] = [0, 1].map(|i| estimate.at[i].uncertainty / allowed[i]);
-        base.max(omega)
-    }
-
-    /// Largest uncertainties allowed of the drive, m, and of the frequency, rad/s, at this drive, m.
-    fn allowed(&self, drive: f64) -> [f64; 2] {
-        let (base, omega0) = (self.precision * drive.abs(), self.knowledge.linear.omega0);
-        [base, omega0 * base / self.largest]
+        let [drive, omega] = estimate.at;
+        let allowed = self.precision * drive.value.abs();
+        let of_omega = self.knowledge.linear.omega0 * allowed / self.largest;
+        (drive.uncertainty / allowed).max(omega.uncertainty / of_omega)
     }
 
     /// Slopes of drive and frequency over the amplitude at a point: of the parabola through it and the two before, with its distance from the

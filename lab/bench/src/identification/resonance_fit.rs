@@ -42,8 +42,6 @@ pub struct ResonanceFit {
 
 /// Largest lag of the impacts behind a change of the amplitude, periods (studies/tracking.rs).
 const LAG: f64 = 1.6;
-/// Multiples of the sampling rate whose neighbours are aliased: those of the third have a ninth of the power of those of the first.
-const ALIASES: i32 = 2;
 
 impl ResonanceFit {
     /// Fewest periods: one more than a steady motion has unknowns.
@@ -196,9 +194,8 @@ fn aliases(cycles: &[Cycle], knowledge: &Knowledge, growth: Complex<f64>) -> Vec
         let turned = in_period.round() * cycle.drive_phase - TAU * (cycle.time / knowledge.sample_time).fract();
         growth * Complex::cis(f64::from(order) * turned) / cycle.response
     };
-    let orders = (1..=ALIASES)
-        .filter(|_| largest > 0.0)
-        .flat_map(|order| [order, -order]);
+    // The neighbours of the third multiple of the sampling rate have a ninth of the power of those of the first.
+    let orders = (1..=2).filter(|_| largest > 0.0).flat_map(|order| [order, -order]);
     let parts = orders.flat_map(|order| [(order, Complex::ONE), (order, Complex::i())]);
     let disturbance = |(order, part): (i32, Complex<f64>)| Disturbance {
         rates: cycles.iter().map(|cycle| part * beat(cycle, order)).collect(),

@@ -14,7 +14,7 @@ use super::{
     CheckedChannel, CheckedQuantity, DEAD, FACTOR, Fitted, Linear, LoopCheck, NOTED, OpenLoop, PHASE, Sine, Verdict,
     first_of, noise_of, of_response, quantity,
 };
-use crate::rig::{Rig, RigError, Scaled};
+use crate::rig::{Rig, RigError};
 use vines_scene::linear::{LinearResponse, POINT_RESOLUTION, ParticleState};
 use vines_scene::plan::Plan;
 use vines_scene::scene::{PLACES, frequencies};
@@ -35,10 +35,8 @@ pub(super) fn check(
     stated: &ShakerPath,
     share: f64,
 ) -> Result<LoopCheck, RigError> {
-    let (target, linear) = (plan.knowledge.target, plan.knowledge.linear);
-    let amplitude = share * plan.amplitude;
-    let mut scaled = Scaled::new(rig, target);
-    let mut rig = OpenLoop::new(&mut scaled, target, plan.knowledge.sample_time);
+    let (linear, amplitude) = (plan.knowledge.linear, share * plan.amplitude);
+    let mut rig = OpenLoop::new(rig, plan);
     let frequencies = frequencies(linear.omega0, linear.damping_rate);
     let mut all = Vec::new();
     for omega in frequencies {

@@ -2,11 +2,10 @@
 
 use std::collections::VecDeque;
 
-use lovines::Parameters;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
 use super::chain::normal;
-use super::{Chain, Drive, Measured, Rig, RigError, Sensors, SensorsOnly, ShakerFault, Simulated, SimulatedStructure};
+use super::{Chain, Drive, Rig, RigError, Sensors, SensorsOnly, ShakerFault, Simulated};
 use vines_scene::scene::Scene;
 
 /// What fails in a rig.
@@ -139,23 +138,17 @@ pub fn faulty(
     seconds: f64,
     ended: impl FnMut(Option<f64>) + 'static,
 ) -> Result<SensorsOnly, RigError> {
-    let plant = |stiffness: f64| -> Result<Box<dyn Rig>, RigError> {
-        let Some(structure) = &scene.structure else {
-            let plant = Simulated::new(Parameters { stiffness, ..scene.plant }, scene.start)?;
-            return Ok(Box::new(plant.with_sensors(scene.resonance)));
-        };
-        let mut plant = SimulatedStructure::new(structure, scene.plant, scene.start)?;
-        if let RigFault::Electrodynamic(fault) = fault {
-            plant = plant.failing(fault, seconds);
-        }
-        let measured = Measured::new(plant, scene.resonance, &scene.plant);
-        Ok(Box::new(measured.compensating(Some(structure))))
+    let of_shaker = match fault {
+        RigFault::Electrodynamic(fault) => Some((fault, seconds)),
+        _ => None,
     };
     // A natural frequency that is a tenth higher.
-    let changed = (fault == RigFault::Structure).then(|| plant(1.21 * scene.plant.stiffness));
+    let mut stiffer = scene.clone();
+    stiffer.plant.stiffness *= 1.21;
+    let changed = (fault == RigFault::Structure).then(|| Simulated::failing(&stiffer, None));
     let (begins, units) = ((seconds / scene.sample_time()) as usize, scene.units());
     let rig = Faulty {
-        rig: plant(scene.plant.stiffness)?,
+        rig: Simulated::failing(scene, of_shaker)?,
         changed: changed.transpose()?,
         fault,
         sample_time: scene.sample_time(),
@@ -225,11 +218,9 @@ impl Faulty {
     ) -> Result<(), RigError> {
         let elapsed = self.elapsed();
         self.taken += 1;
-        self.driven = if asked == 0.0 {
-            self.driven
-        } else {
-            self.driven.max(self.taken)
-        };
+        if asked != 0.0 {
+            self.driven = self.driven.max(self.taken);
+        }
         if let Some(changed) = &mut self.changed {
             apply(&mut **changed, drive)?;
         }

@@ -4,8 +4,8 @@ use lovines::{InvalidValue, Parameters, Plant, Primary, Single, State};
 use vines_model::{Definition, Sensor};
 
 use super::{
-    Chain, Clock, Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, SimulatedStructure,
-    has_friction,
+    Chain, Clock, Drive, FrictionTotals, GroundTruth, Measured, Rig, RigError, Sensors, ShakerFault,
+    SimulatedStructure, has_friction,
 };
 use vines_scene::scene::Scene;
 
@@ -31,10 +31,16 @@ impl Simulated {
 
     /// The rig of a scene with its sensors: one oscillator, or a structure.
     pub fn without_chain(scene: &Scene) -> Result<Box<dyn Rig>, RigError> {
+        Self::failing(scene, None)
+    }
+
+    /// [`Self::without_chain`], with a fault of the shaker of a structure that begins after some seconds.
+    pub(super) fn failing(scene: &Scene, fault: Option<(ShakerFault, f64)>) -> Result<Box<dyn Rig>, RigError> {
         Ok(match &scene.structure {
             None => Box::new(Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance)),
             Some(structure) => {
-                let rig = SimulatedStructure::new(structure, scene.plant, scene.start)?;
+                let mut rig = SimulatedStructure::new(structure, scene.plant, scene.start)?;
+                rig.fault = fault;
                 Box::new(Measured::new(rig, scene.resonance, &scene.plant).compensating(Some(structure)))
             }
         })

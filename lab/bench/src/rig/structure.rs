@@ -17,7 +17,7 @@ pub struct SimulatedStructure {
     /// Largest command that the amplifier passes on, V.
     clipped_at: f64,
     /// What fails, and when, s.
-    fault: Option<(ShakerFault, f64)>,
+    pub(super) fault: Option<(ShakerFault, f64)>,
     /// Largest command so far, V.
     driven: f64,
     /// The structure with its stinger, while this is cut by a release.
@@ -63,12 +63,6 @@ impl SimulatedStructure {
     /// The structure as it is now: with its stinger, or without.
     pub fn structure(&self) -> &Structure {
         &self.structure
-    }
-
-    /// With a fault of the shaker that begins after some seconds.
-    #[must_use]
-    pub(crate) fn failing(self, fault: ShakerFault, seconds: f64) -> Self {
-        Self { fault: Some((fault, seconds)), ..self }
     }
 
     /// Goes on as another structure with the same coordinates: with a cut stinger, or with its own.

@@ -150,7 +150,10 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
         Ok(())
     };
     let ended = ends(|| Ok(()), nan);
-    assert!(matches!(ended, Ok(Err(ExperimentError::Command { name: "E", .. }))));
+    let Ok(Err(ExperimentError::Refused(message))) = ended else {
+        panic!("{ended:?}");
+    };
+    assert!(message.starts_with("answered E = NaN"), "{message}");
 }
 
 /// An experiment with a controller without limits and with another answer, and the largest drive that reached the rig, m.
