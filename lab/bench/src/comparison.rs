@@ -167,6 +167,9 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
 
 // Distance of measured points from the exact backbone.
 
+/// Largest particle speed of the curve: beyond symmetry breaking.
+const SPEED_MAX: f64 = 1.35;
+
 /// A curve to draw: sigma and C of its points, and whether the motion is stable or neutral there.
 pub type DrawnCurve = Vec<([f64; 2], bool)>;
 
@@ -208,8 +211,7 @@ fn place(orbit: &Orbit) -> Place {
 
 /// The places of a curve from its smallest response towards faster particles.
 fn right_of_fold(curve: &[Orbit]) -> Vec<Place> {
-    // Symmetry breaking is at slower particles.
-    let mut orbits: Vec<&Orbit> = curve.iter().filter(|orbit| orbit.b < 1.35).collect();
+    let mut orbits: Vec<&Orbit> = curve.iter().filter(|orbit| orbit.b < SPEED_MAX).collect();
     orbits.sort_by(|one, other| one.b.total_cmp(&other.b));
     let fold = (0..orbits.len()).min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c));
     let rising = orbits.iter().skip(fold.unwrap_or(0));

@@ -207,7 +207,9 @@ fn conduct<R: Rig + ?Sized, C: Controller + ?Sized>(
 
 // Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
 
-/// Periods within which the loops, whose time constant is five periods at most, and the particle follow a change of their setpoint.
+/// Slowest time constant of the loops, periods.
+pub(crate) const SLOWEST_LOOP: f64 = 5.0;
+/// Periods within which the loops and the particle follow a change of their setpoint.
 pub(crate) const FOLLOWED: usize = 8;
 /// Observations in succession that are not taken for chance: periods, or legs of the search.
 pub(crate) const CONFIRMED: u32 = 3;

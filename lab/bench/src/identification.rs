@@ -261,6 +261,9 @@ const SPREAD: f64 = 0.008;
 /// Smallest disturbance of a motion, relative to the response: less than the noise of any rig.
 const SMALLEST_DISTURBANCE: f64 = 1e-6;
 
+/// Largest phase error of a period that is evaluated, rad: the balances are of the first order in it.
+const PHASE_RANGE: f64 = 0.1;
+
 /// The locked point of a record; `None` without a motion.
 fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
     let knowledge = &plan.knowledge;
@@ -338,8 +341,7 @@ fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
         move |cycle: &Cycle| (value(cycle) - level).abs() <= (SPREAD * level).max(4.0 * scatter)
     };
     let (response, drive) = (near(Cycle::amplitude), near(|cycle| cycle.base.norm()));
-    // The balances are of the first order in the phase error.
-    let is_near = |cycle: &&Cycle| response(cycle) && drive(cycle) && cycle.phase_error.abs() <= 0.1;
+    let is_near = |cycle: &&Cycle| response(cycle) && drive(cycle) && cycle.phase_error.abs() <= PHASE_RANGE;
     let near = cycles.iter().rev().take_while(is_near).count();
     let fewest = held.len().max(2 * ResonanceFit::FEWEST);
     &cycles[cycles.len() - near.max(fewest).min(cycles.len())..]

@@ -16,7 +16,7 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 
-use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, Sample, Stage};
+use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, Stage};
 use crate::identification::{
     Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, SAME, Unsteady, is_another, is_wanted,
     regime_by_response, regime_of_leg, subharmonic, without_tones,
@@ -450,8 +450,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// The move changes what rings by its own share at most, of which less than the precision is left.
     fn followed(&self, level: f64) -> usize {
         let Knowledge { shaker, rings, target, .. } = self.knowledge;
-        // Both roots of the control of a shaker are at half of its bandwidth; the loops follow with a time constant of five periods.
-        let of_control = |path: ShakerPath| FOLLOWED as f64 / 5.0 / (PI * BANDWIDTH * path.speed);
+        // Both roots of the control of a shaker are at half of its bandwidth.
+        let of_control = |path: ShakerPath| FOLLOWED as f64 / SLOWEST_LOOP / (PI * BANDWIDTH * path.speed);
         let of_control = shaker.map_or(0.0, of_control).min(LONGEST_SETTLING as f64).ceil();
         let share = (level / self.here()[0] - 1.0).abs() / self.run.plan.precision;
         // In these periods the pole that rings longest falls by a factor of e.
