@@ -38,7 +38,7 @@ pub struct Cycle {
 }
 
 /// Harmonics that are fitted to a displacement.
-pub(super) const HARMONICS: usize = 3;
+const HARMONICS: usize = 3;
 
 /// What is fitted to a channel over one period of the drive.
 struct Bases {

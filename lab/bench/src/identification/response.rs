@@ -14,7 +14,6 @@ use serde::Serialize;
 use vines_model::numerics::{Estimate, HarmonicBasis, golden_section, mean};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
-use super::cycle::HARMONICS;
 use super::{Cycle, harmonics_of};
 use crate::record::Sample;
 use vines_scene::knowledge::{Knowledge, Target};
@@ -32,14 +31,22 @@ const SIGNIFICANT_HARMONIC: f64 = 4.0;
 /// Smallest even harmonic of an asymmetric motion, over the larger odd one next to it: of the second over the third, symmetric motions have about
 /// 0.01, irregular ones 2 and more.
 const ASYMMETRIC: f64 = 0.5;
+/// Harmonics that are fitted to a displacement.
+const RESPONSE_HARMONICS: usize = 5;
 
-/// All harmonics that `n` samples, `turn` rad of the motion apart, can show. Their amplitudes are quadratic in time for the fundamental, and constant
-/// for the others.
-fn basis(n: usize, turn: f64) -> HarmonicBasis {
+/// All harmonics that the samples can show.
+const ALL_HARMONICS: Measurand = Measurand::Acceleration;
+
+/// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
+fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
+    let count = harmonics_of(measurand, samples_per_period, RESPONSE_HARMONICS);
+    [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
+}
+
+/// The harmonics that belong to what `measurand` says, for `n` samples `turn` rad of the motion apart.
+fn basis(n: usize, turn: f64, measurand: Measurand) -> HarmonicBasis {
     let phases: Vec<f64> = (0..n).map(|n| n as f64 * turn).collect();
-    let count = harmonics_of(Measurand::Acceleration, TAU / turn, HARMONICS);
-    let degrees: Vec<_> = (0..count).map(|n| Some(if n == 0 { 2 } else { 0 })).collect();
-    HarmonicBasis::new(&phases, 1, &degrees)
+    HarmonicBasis::new(&phases, 1, &degrees(measurand, TAU / turn))
 }
 
 /// Harmonic content of the response, relative to its fundamental.
@@ -82,9 +89,15 @@ impl Content {
         })
     }
 
-    /// Fits what a channel reads, 0 the response or 1 the reference; `None` for too few samples or no motion. `is_moving`: the motion may change in
-    /// the meantime.
-    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, channel: usize, is_moving: bool) -> Option<Self> {
+    /// Fits what a channel reads, 0 the response or 1 the reference, with as many harmonics as belong to what `measurand` says; `None` for too few
+    /// samples or no motion. `is_moving`: the motion may change in the meantime.
+    fn of(
+        samples: &[Sample],
+        knowledge: &Knowledge,
+        omega: f64,
+        (channel, measurand): (usize, Measurand),
+        is_moving: bool,
+    ) -> Option<Self> {
         let (sample_time, d) = (knowledge.sample_time, knowledge.numbers);
         let reading = |sample: &Sample| match channel {
             0 => sample.sensors.response,
@@ -93,7 +106,7 @@ impl Content {
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let (n, turn) = (samples.len(), omega * sample_time);
         let mut values = DVector::from_iterator(n, samples.iter().map(reading));
-        let of_all = basis(n, turn);
+        let of_all = basis(n, turn, measurand);
         if n < 2 * of_all.terms() {
             return None;
         }
@@ -113,15 +126,15 @@ impl Content {
         }
         let content = Self { tones: lines, ..content };
         match is_moving {
-            true => content.changed(&values, turn),
+            true => content.changed(&values, turn, measurand),
             false => Some(content),
         }
     }
 
     /// With what a change of the motion, as both halves of the values show it, adds to the errors of the harmonics.
-    fn changed(mut self, values: &DVector<f64>, turn: f64) -> Option<Self> {
+    fn changed(mut self, values: &DVector<f64>, turn: f64, measurand: Measurand) -> Option<Self> {
         let (n, half) = (values.len(), values.len() / 2);
-        let of_half = basis(half, turn);
+        let of_half = basis(half, turn, measurand);
         let [first, second] =
             [0, n - half].map(|from| of_half.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
         let halves = [first?, second?];
@@ -174,7 +187,7 @@ impl Content {
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, knowledge, omega, 0, false)?;
+    let content = Content::of(samples, knowledge, omega, (0, ALL_HARMONICS), false)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
     Some(Tone {
@@ -185,7 +198,7 @@ pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64
 
 /// These samples without the foreign tones in their response; `None` if there are none.
 pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, knowledge, omega, 0, false)?.tones;
+    let tones = Content::of(samples, knowledge, omega, (0, knowledge.target.measurands[0]), false)?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -209,7 +222,7 @@ pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) ->
 fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
     let content = knowledge
         .shaker
-        .and_then(|_| Content::of(samples, knowledge, omega, 1, false));
+        .and_then(|_| Content::of(samples, knowledge, omega, (1, ALL_HARMONICS), false));
     content.is_some_and(|content| content.is_asymmetric(knowledge.target.measurands[1].order()))
 }
 
@@ -261,7 +274,7 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
 pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    match Content::of(samples, knowledge, omega.value, 0, false) {
+    match Content::of(samples, knowledge, omega.value, (0, ALL_HARMONICS), false) {
         None => Regime::Unknown,
         Some(content) if content.is_irregular() => Regime::Other,
         Some(content) => {
@@ -279,7 +292,7 @@ pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base
 /// [`regime_by_response`] of a few periods under the control of a loop, for the choice of the next move: the linear response counts as known. While the
 /// setpoint moves, what the harmonics do not describe is the way, and not irregular. `at`: mean response, m, base, m, and frequency, rad/s.
 pub(crate) fn regime_of_leg(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3], is_at_rest: bool) -> Regime {
-    match Content::of(samples, knowledge, at[2].value, 0, true) {
+    match Content::of(samples, knowledge, at[2].value, (0, ALL_HARMONICS), true) {
         None => Regime::Unknown,
         Some(content) if is_at_rest && content.is_irregular() => Regime::Other,
         Some(content) => regime_of(&content, samples, knowledge, at, true),
