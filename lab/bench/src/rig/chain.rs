@@ -53,8 +53,17 @@ impl InputChannel {
 }
 
 impl Chain {
-    /// The rig behind the chain of a scene; a chain that is off passes everything on.
+    /// The rig behind its chain, or the rig itself where the chain is off.
     pub fn around(rig: Box<dyn Rig>, scene: &Scene) -> Box<dyn Rig> {
+        if scene.chain.is_on() {
+            Box::new(Self::new(rig, scene))
+        } else {
+            rig
+        }
+    }
+
+    /// The chain of a scene around `rig`.
+    pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
         let (settings, d, noise) = (&scene.chain, scene.dimensionless(), scene.noise());
         let channel = |range: f64, noise: f64| InputChannel {
             noise,
@@ -68,7 +77,7 @@ impl Chain {
             .resonance
             .measurands()
             .map(|measurand| d.omega0.powi(measurand.order()));
-        Box::new(Self {
+        Self {
             rig,
             response: channel(
                 response.of_metres(settings.response_range * d.b) * per_displacement[0],
@@ -86,7 +95,7 @@ impl Chain {
             late: 0.0,
             under_way: vec![Sensors::default(); settings.delay as usize].into(),
             elapsed: 0.0,
-        })
+        }
     }
 
     /// Duration of a sample period of `step` seconds, whose end is not where it should be.
