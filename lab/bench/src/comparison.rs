@@ -167,6 +167,8 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
 
 // Distance of measured points from the exact backbone.
 
+/// Orbits of the curve of one oscillator: as a polygon it is off by less than 1e-5.
+const OSCILLATOR_ORBITS: usize = 3000;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
@@ -242,8 +244,10 @@ impl ExactCurve {
             curve.points.retain(|orbit| orbit.b >= flow.manifold.b_min());
             curve.points
         };
-        // The error of a polygon of so many orbits is below 1e-5.
-        let curves: Vec<_> = backbone(scene, None, 3000).into_iter().map(beyond_fold).collect();
+        let curves: Vec<_> = backbone(scene, None, OSCILLATOR_ORBITS)
+            .into_iter()
+            .map(beyond_fold)
+            .collect();
         let middle = flow.backbone_at(0.5 * (flow.manifold.b_min() + B_SYMMETRY_BREAKING));
         Self::nearest(ExactOrbits::of_oscillator(scene), &curves, [middle.sigma, middle.c])
     }

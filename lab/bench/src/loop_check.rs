@@ -320,7 +320,7 @@ fn growth(
     let deviation = (response.variance + misfit * periods).sqrt();
     let sizes = (0..=CHECK_PERIODS[1]).map(|n| response.after(n).norm());
     let largest = sine.omega * sine.omega * sizes.fold(0.0, f64::max);
-    let particle = match GAIN * largest < plan.knowledge.carried_up_to {
+    let particle = match FRICTION * largest < plan.knowledge.carried_up_to {
         true => ParticleState::Carried,
         false => ParticleState::Unknown,
     };
@@ -569,8 +569,9 @@ fn quantity(
 const NOISE: f64 = 0.15;
 /// Share of the expected amplitude below which a sensor is dead.
 const DEAD: f64 = 0.01;
-/// Factor by which an amplitude may differ from the expected one, or its inverse, and the friction in the rig from that in its drawing: damping and friction
-/// are known roughly.
+/// Largest friction in a drawing over the rig's.
+const FRICTION: f64 = 2.0;
+/// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
 const GAIN: f64 = 2.0;
 
 /// A channel.

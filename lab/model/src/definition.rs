@@ -181,14 +181,20 @@ impl Definition {
 impl Sensor {
     /// As in a table.
     pub fn name(&self) -> &'static str {
-        ["v", "q1"][*self as usize]
+        match self {
+            Sensor::V => "v",
+            Sensor::Q1 => "q1",
+        }
     }
 }
 
 impl Reference {
     /// As in a table.
     pub fn name(&self) -> &'static str {
-        ["e", "the force"][*self as usize]
+        match self {
+            Reference::Base => "e",
+            Reference::Force => "the force",
+        }
     }
 
     /// Amplitude of the reference, a force as its static displacement, over that of the base that makes it at omega0; `damping`: 2 zeta.

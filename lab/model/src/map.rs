@@ -383,8 +383,10 @@ fn regime(orbit: &Periodic) -> Regime {
     }
 }
 
-/// Steps per period at which the response is read, and smallest number of periods over which it is averaged.
-const READINGS: usize = 64;
+/// Steps per period at which the response is read.
+const STEPS_PER_PERIOD: usize = 64;
+/// Smallest number of periods over which it is averaged.
+const AVERAGED: usize = 64;
 /// Largest number of periods until the response is read.
 const WAITED: f64 = 2000.0;
 
@@ -409,14 +411,14 @@ impl CellRun {
             let _ = self.follow(self.periods() + waited as usize + 1)?;
         }
         let unit = if repeats { result.periods as usize } else { 1 };
-        let periods = unit * READINGS.div_ceil(unit);
+        let periods = unit * AVERAGED.div_ceil(unit);
         let plant = &mut self.plant;
         let (omega, e) = (self.drive.omega, self.drive.amplitude);
         let damping = plant.parameters().damping;
-        let phase = |n: usize| TAU * n as f64 / READINGS as f64;
+        let phase = |n: usize| TAU * n as f64 / STEPS_PER_PERIOD as f64;
         let energy = |plant: &lovines::Plant, n: usize| plant.energy(e * phase(n).sin());
         let before = (energy(plant, 0), plant.totals().dissipated, plant.state().q1);
-        let count = periods * READINGS;
+        let count = periods * STEPS_PER_PERIOD;
         let (mut harmonic, mut work) = ([0.0; 2], 0.0);
         for n in 0..count {
             let (sin, cos) = phase(n).sin_cos();
@@ -425,7 +427,7 @@ impl CellRun {
             // Power of the base, (k (e - q1) + c (e' - q1')) e', with the jumps of q1' integrated by parts.
             let (slope, curvature) = (e * omega * cos, -e * omega * omega * sin);
             work += (e * sin - q1) * slope + damping * (slope * slope + q1 * curvature);
-            plant.advance(self.drive, TAU / (omega * READINGS as f64))?;
+            plant.advance(self.drive, TAU / (omega * STEPS_PER_PERIOD as f64))?;
         }
         let duration = periods as f64 * TAU / omega;
         let ends = damping * (plant.state().q1 - before.2) * e * omega * phase(0).cos();

@@ -66,8 +66,10 @@ impl RecordingError {
     }
 }
 
-/// Periods within which a constant hardly drifts, and fewest periods of a recording.
+/// Periods within which a constant hardly drifts.
 const SLOW: usize = 16;
+/// Fewest periods of a recording: the drift is removed over as many.
+const FEWEST_PERIODS: f64 = SLOW as f64;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
 /// Fewest periods of a decay, and periods of the pieces whose damping is compared.
@@ -231,9 +233,9 @@ impl Recording {
             ));
         }
         let (seconds, periods) = (count as f64 * sample_time, count as f64 * sample_time * hertz);
-        if periods < SLOW as f64 {
+        if periods < FEWEST_PERIODS {
             return refused(format!(
-                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {SLOW} are needed"
+                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST_PERIODS} are needed"
             ));
         }
         for ((values, channel), measurand) in both.into_iter().zip(channels).zip(self.measurands) {
