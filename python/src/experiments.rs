@@ -22,7 +22,7 @@ use vines_bench::{
 use vines_model::{
     Measurand,
     map::CellRun,
-    numerics::Estimate,
+    numerics::{Estimate, equally_spaced},
     orbit,
     theory::{SlowFlow, resonant},
 };
@@ -287,7 +287,7 @@ pub fn theory(py: Python<'_>, scene: &Scene, points: i64) -> PyResult<String> {
     json(&calculate(py, move || {
         json!({
             "solutions": resonant(&numbers),
-            "backbone": flow.backbone(manifold.b_min(), to, points as usize),
+            "backbone": equally_spaced(manifold.b_min(), to, points as usize).map(|b| flow.backbone_at(b)).collect::<Vec<_>>(),
             "B_min": manifold.b_min(),
             "C_min": manifold.c_min(),
         })

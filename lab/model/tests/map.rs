@@ -3,7 +3,6 @@
 use vines_model::{
     Dimensionless,
     map::{CellRun, RegimeResult, observe},
-    orbit::settle,
     regime::Regime,
 };
 
@@ -69,16 +68,4 @@ fn a_moving_particle_is_never_without_impacts() {
     let slow = observe(&scene(0.0), 0.0, [0.0, 0.0, 0.0, 1e-5], 1000).unwrap();
     assert_eq!((slow.regime, slow.followed), (Regime::Undecided, 1000));
     assert_eq!(observe(&scene(0.0), 0.0, REST, 1000).unwrap().regime, Regime::NoImpacts);
-}
-
-#[test]
-fn the_exponent_of_a_stable_orbit_is_that_of_its_multipliers() {
-    for (g, sigma) in [(1.1, -1.1408), (1.6, -0.9), (2.2, -0.6)] {
-        let motion = settle(&scene(g), sigma, MOVING, 2000).unwrap().unwrap();
-        let expected = 2.0 * motion.stability.growth().ln() / f64::from(motion.pattern.half_periods);
-        let result = at(g, sigma, MOVING);
-        let (found, error) = (result.exponent.unwrap(), result.exponent_error.unwrap());
-        let tolerance = 0.02 * expected.abs() + 2.0 * error;
-        assert!((found - expected).abs() < tolerance, "{found} {expected}");
-    }
 }

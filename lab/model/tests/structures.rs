@@ -4,18 +4,12 @@ mod common;
 
 use std::f64::consts::FRAC_PI_2;
 
-use common::{at_phase_zero, within};
+use common::within;
 use lovines::oscillator::Oscillator;
 use lovines::{Excitation, Host, Mode};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use vines_model::{
-    Dimensionless, Reference,
-    orbit::{
-        Bifurcation, Condition, Orbit, Particle, StructureBranch, StructureOrbit, StructureOrbits, StructureRange,
-        exact_backbone, phase_resonant, symmetric_orbits,
-    },
-    theory::SlowFlow,
-};
+use vines_model::orbit::{Bifurcation, Particle, StructureBranch, StructureOrbit, StructureOrbits, StructureRange};
+use vines_model::theory::SlowFlow;
 
 /// The default scene: mass, stiffness and damping of its oscillator, and the particle.
 const RIG: [f64; 3] = [3.807, 11.68e3, 2.53];
@@ -141,92 +135,6 @@ fn base_per_drive(host: &Host) -> f64 {
     let section = &host.sections()[0];
     let Oscillator { delta, omega0, omega0_squared, .. } = section.oscillator;
     (section.driven(omega0)[0] * section.cavity[0]).norm() / omega0_squared.hypot(2.0 * delta * omega0)
-}
-
-/// Largest difference of an orbit of a structure from one of the oscillator, over the units of the latter.
-fn apart(found: &StructureOrbit, scene: &Dimensionless, orbit: &Orbit, base_per_drive: f64) -> f64 {
-    let mut pairs = vec![
-        (found.omega / scene.omega0, orbit.omega),
-        (scene.excitation(base_per_drive * found.drive), orbit.g),
-        (found.response / scene.b, orbit.c),
-        (found.phase, orbit.gamma),
-        (scene.speed(found.speed), orbit.b),
-        (scene.speed(found.impact_velocity), orbit.impact_velocity),
-    ];
-    if scene.definition.reference == Reference::Base {
-        // The state of the oscillator where the phase of the base is 0.
-        let here = [Condition::Sigma(orbit.sigma), Condition::Excitation(orbit.g)];
-        let [q1, dq1, q2, dq2] = at_phase_zero(scene, &orbit.periodic(scene, here).unwrap());
-        let start = &found.start;
-        let [x, v] = start.sections[0].map(|value| value * shape());
-        pairs.extend([
-            (found.impact_phase, orbit.start.phase),
-            (x / scene.b, q1),
-            (scene.speed(v), dq1),
-            (start.q2 / scene.b, q2),
-            (scene.speed(start.dq2), dq2),
-        ]);
-    }
-    let moduli = found
-        .stability
-        .multipliers
-        .iter()
-        .map(|[re, im]| re.hypot(*im))
-        .zip(orbit.multipliers);
-    let off = |(one, other): (f64, f64)| (one - other).abs();
-    // Two multipliers that nearly meet have half of the digits.
-    let multipliers = moduli.map(off).fold(0.0, f64::max) * 1e-4;
-    pairs.into_iter().map(off).fold(multipliers, f64::max)
-}
-
-#[test]
-fn a_structure_of_one_mode_has_the_orbits_of_the_oscillator() {
-    let damping = RIG[2] / (RIG[0] * omega0());
-    let mut worst = 0_f64;
-    let mut compare = |found: Vec<StructureOrbit>, expected: Vec<Orbit>, scene: &Dimensionless, per_drive: f64| {
-        assert_eq!(found.len(), expected.len());
-        for (one, other) in found.iter().zip(&expected) {
-            assert_eq!(one.stability.stable, other.stable);
-            worst = worst.max(apart(one, scene, other, per_drive));
-        }
-        found.len()
-    };
-    for (excitation, drive) in [(Excitation::Force, shape()), (Excitation::Base, 1.0 / shape())] {
-        let host = Host::from_modes(excitation, &[mode(1.0, 1.0, [shape(), drive])]).unwrap();
-        let orbits = StructureOrbits::new(&host, PARTICLE);
-        let is_force = excitation == Excitation::Force;
-        let (mut numbers, base_per_drive) = (orbits.numbers(0).unwrap(), base_per_drive(&host));
-        assert!((numbers.epsilon - 0.032 / 3.807).abs() < 1e-15 && (numbers.b - 0.01).abs() < 1e-15);
-        // The base of the oscillator exerts its force through spring and damper; the ratio is that at the natural frequency.
-        let per_drive = |omega: f64| {
-            let force = |omega: f64| if is_force { 1_f64.hypot(damping * omega) } else { 1.0 };
-            base_per_drive * force(1.0) / force(omega)
-        };
-        let mut count = 0;
-        for n in 0..400 {
-            let omega = 0.97 + 1e-4 * f64::from(n);
-            let (found, expected) = (
-                orbits.at_phase_resonance(omega * omega0()),
-                exact_backbone(&numbers, omega),
-            );
-            count += compare(found, expected, &numbers, per_drive(omega));
-        }
-        assert!(count > 200, "{count}");
-        if !is_force {
-            numbers.g = 1.1;
-            let drive = numbers.amplitude(numbers.g) / base_per_drive;
-            for n in 0..100 {
-                let sigma = -3.0 + 0.04 * f64::from(n);
-                let found = orbits.at(numbers.omega(sigma), drive);
-                compare(found, symmetric_orbits(&numbers, sigma), &numbers, base_per_drive);
-            }
-            let found = orbits.resonant(drive, [0.97, 1.01].map(|omega| omega * omega0()));
-            let all = phase_resonant(&numbers).into_iter();
-            let near = all.filter(|orbit| (0.97..1.01).contains(&orbit.omega)).collect();
-            assert!(compare(found, near, &numbers, base_per_drive) > 1);
-        }
-    }
-    assert!(worst < 1e-10, "{worst:e}");
 }
 
 #[test]

@@ -5,7 +5,9 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use lovines::Drive;
-use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, Manifold, SlowFlow, impacts_stable};
+use vines_model::theory::{
+    B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Manifold, SlowFlow, impacts_stable, resonant,
+};
 use vines_model::{Dimensionless, numerics::try_bisection};
 
 use common::{close, rows};
@@ -22,6 +24,11 @@ const DRIVES: [(f64, f64); 6] = [
     (0.9, -1.2),
     (1.1, 3.0),
 ];
+
+/// The phase-resonant motions of an oscillator under the excitation `g`.
+fn phase_resonant(lambda: f64, r: f64, g: f64) -> Vec<BackbonePoint> {
+    resonant(&Dimensionless::new(EPSILON, lambda, r, g))
+}
 
 fn flow() -> SlowFlow {
     SlowFlow::new(LAMBDA, R)
@@ -122,7 +129,7 @@ fn phase_resonance_is_the_equilibrium_at_minus_a_quarter_turn_with_the_largest_a
     for (r, above) in [0.4, R, 0.9].into_iter().flat_map(|r| [0.05, 0.2, 0.6].map(|g| (r, g))) {
         let flow = SlowFlow::new(LAMBDA, r);
         let g = flow.backbone_at(flow.manifold.b_min()).g + above;
-        let points = flow.phase_resonant(g);
+        let points = phase_resonant(LAMBDA, r, g);
         for point in &points {
             close(point.g, g, 1e-12);
             let mut equilibria = flow.equilibria(g, point.sigma).into_iter();
@@ -143,15 +150,6 @@ fn phase_resonance_is_the_equilibrium_at_minus_a_quarter_turn_with_the_largest_a
         for sigma in (-400..400).map(|n| 0.01 * f64::from(n)).chain(near) {
             assert!(highest(sigma) < last.c, "r = {r}, G = {g}, sigma = {sigma}");
         }
-    }
-}
-
-#[test]
-fn the_slope_of_the_excitation_is_its_difference_quotient() {
-    let flow = flow();
-    for b in [0.3, 0.7, 1.0] {
-        let [plus, minus] = [1e-6, -1e-6].map(|h| flow.backbone_at(b + h));
-        close(flow.excitation_slope(b), (plus.g - minus.g) / (plus.c - minus.c), 1e-7);
     }
 }
 
@@ -193,7 +191,7 @@ fn the_decay_in_closed_form_follows_the_slow_flow_to_the_fold() {
 fn the_theory_columns_of_the_references_are_reproduced() {
     for row in rows() {
         let [sigma, c, b] = row.theory;
-        let points = SlowFlow::new(row.lambda, row.r).phase_resonant(row.g).into_iter();
+        let points = phase_resonant(row.lambda, row.r, row.g).into_iter();
         let mut apart = points.map(|one| (one.sigma - sigma).abs().max((one.c - c).abs()).max((one.b - b).abs()));
         assert!(apart.any(|apart| apart < 1e-10), "{row:?}");
     }
@@ -202,7 +200,7 @@ fn the_theory_columns_of_the_references_are_reproduced() {
 #[test]
 fn elastic_impacts_have_no_solution_without_amplitude() {
     for lambda in [LAMBDA, 0.0] {
-        let points = SlowFlow::new(lambda, 1.0).phase_resonant(1.1);
+        let points = phase_resonant(lambda, 1.0, 1.1);
         assert!(points.iter().all(|point| point.c > 0.1), "{points:?}");
     }
 }

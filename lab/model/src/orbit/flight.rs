@@ -9,9 +9,9 @@ use lovines::Section;
 use nalgebra::{Complex, Vector2};
 
 /// A flight in the cavity of a host under a harmonic drive.
-pub(super) struct Flight<S> {
+pub(super) struct Flight<'a> {
     /// The sections, with (x, v) of their free motion at the start.
-    pub sections: S,
+    pub sections: &'a [(Section, Vector2<f64>)],
     /// Harmonic of the cavity's displacement from the start on, and its angular frequency.
     pub harmonic: Complex<f64>,
     pub omega: f64,
@@ -24,12 +24,12 @@ pub(super) const GRAZING: f64 = 1e-9;
 /// Most steps of a flight: far more than any flight needs, except in chatter.
 const MOST_FLIGHT_STEPS: usize = 4000;
 
-impl<S: AsRef<[(Section, Vector2<f64>)]>> Flight<S> {
+impl Flight<'_> {
     /// Displacement and velocity of the cavity after the time `t`.
-    pub(super) fn cavity(&self, t: f64) -> Vector2<f64> {
+    fn cavity(&self, t: f64) -> Vector2<f64> {
         let z = self.harmonic * Complex::from_polar(1.0, self.omega * t);
         let mut cavity = Vector2::new(z.im, self.omega * z.re);
-        for (section, state) in self.sections.as_ref() {
+        for (section, state) in self.sections {
             cavity += section.at(section.cavity, section.propagator(t) * state);
         }
         cavity
@@ -42,13 +42,13 @@ impl<S: AsRef<[(Section, Vector2<f64>)]>> Flight<S> {
             let ceiling = |state: Vector2<f64>| (2.0 * delta + omega0) * state[1].hypot(omega0 * state[0]);
             section.cavity[0].abs() * ceiling(*state) + section.cavity[1].abs() * ceiling(section.rate(*state))
         };
-        let free: f64 = self.sections.as_ref().iter().map(bound).sum();
+        let free: f64 = self.sections.iter().map(bound).sum();
         self.harmonic.norm() * self.omega * self.omega + free
     }
 
-    /// Time and wall of the first contact within `periods`, from (w, w') at the start on: +1 for w = +`half_width`. `None` without a contact, if
+    /// Time and wall of the first contact within a period, from (w, w') at the start on: +1 for w = +`half_width`. `None` without a contact, if
     /// it grazes, or if impacts accumulate.
-    pub(super) fn contact(&self, [w, dw]: [f64; 2], half_width: f64, periods: f64) -> Option<(f64, f64)> {
+    pub(super) fn contact(&self, [w, dw]: [f64; 2], half_width: f64) -> Option<(f64, f64)> {
         // Lengths over the half-width, and phases instead of times.
         let speed = half_width * self.omega;
         let k = self.acceleration() / (speed * self.omega);
@@ -72,7 +72,7 @@ impl<S: AsRef<[(Section, Vector2<f64>)]>> Flight<S> {
         for _ in 0..MOST_FLIGHT_STEPS {
             let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
             phase += step;
-            if phase > TAU * periods {
+            if phase > TAU {
                 return None;
             }
             let t = phase / self.omega;

@@ -46,7 +46,7 @@ impl HalfPeriod {
         };
         let (harmonic, omega, particle) = (motion.cavity, motion.omega, [line[0], motion.speed]);
         let flight = Flight { sections, harmonic, omega, particle };
-        let (elapsed, wall) = flight.contact([b, motion.after[1] - motion.speed], b, 1.0)?;
+        let (elapsed, wall) = flight.contact([b, motion.after[1] - motion.speed], b)?;
         let is_half_a_period = wall < 0.0 && ((elapsed - duration) * motion.omega).abs() < ORBIT_ERROR;
         is_half_a_period.then(|| Self {
             impact: impact(&parts, motion),

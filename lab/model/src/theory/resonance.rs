@@ -15,12 +15,13 @@ use crate::{Dimensionless, Sensor};
 /// the sensor reads.
 pub fn resonant(scene: &Dimensionless) -> Vec<BackbonePoint> {
     let theory = Reading::of(scene);
-    let points = theory
+    // By v and the base, the speeds are the roots of a quartic: near them, those of sensor and reference.
+    let speeds = theory
         .flow
-        .phase_resonant(scene.g * scene.definition.off_resonance().cos())
-        .into_iter();
-    points
-        .filter_map(|point| theory.speed(point.b).map(|b| theory.resonance(b)))
+        .equilibrium_speeds(scene.g * scene.definition.off_resonance().cos(), None);
+    speeds
+        .into_iter()
+        .filter_map(|b| theory.speed(b).map(|b| theory.resonance(b)))
         .collect()
 }
 

@@ -226,7 +226,7 @@ impl SlowFlow {
         trace < 0.0 && determinant > 0.0
     }
 
-    /// Particle speeds of all equilibria, ascending; without `sigma`, of those at phase resonance.
+    /// Particle speeds of all equilibria, ascending; without `sigma`, of those at phase resonance, `G C = loss` (eq. 17).
     pub(super) fn equilibrium_speeds(&self, g: f64, sigma: Option<f64>) -> Vec<f64> {
         let mut speeds = real_roots(&self.equilibrium_polynomial(g, sigma));
         // Elastic impacts reach C = 0 at the fold: there everything squared vanishes, but nothing rests.
@@ -300,30 +300,13 @@ impl SlowFlow {
     }
 
     /// Slope dG/dC of the excitation along the backbone (eq. 18).
-    pub fn excitation_slope(&self, b: f64) -> f64 {
+    fn excitation_slope(&self, b: f64) -> f64 {
         let r = self.manifold.dissipation;
         let c = self.manifold.c(b);
         let through_b = 4.0 * b * self.manifold.slope(b) - (b / c).powi(2);
         self.lambda + 2.0 * FRAC_2_PI * r * through_b
     }
 
-    /// All phase-resonant solutions at the excitation `g`, on both branches, by increasing B.
-    ///
-    /// `(G C)^2 = (lambda C^2 + (4/pi) R B^2)^2` (eq. 17) is a quartic in B.
-    pub fn phase_resonant(&self, g: f64) -> Vec<BackbonePoint> {
-        self.equilibrium_speeds(g, None)
-            .into_iter()
-            .map(|b| self.backbone_at(b))
-            .collect()
-    }
-
-    /// `points` samples of the backbone at equal steps of B, from `from` to `to`.
-    pub fn backbone(&self, from: f64, to: f64, points: usize) -> Vec<BackbonePoint> {
-        equally_spaced(from, to, points).map(|b| self.backbone_at(b)).collect()
-    }
-}
-
-impl SlowFlow {
     /// The distance from `sigma_R` of the detunings at which the excitation `g` holds the particle speed `b`: `sqrt(G^2 C^2 - loss^2)/(2 C^2)`
     /// (docs/theory.md, eq. 15). At the ends, which are phase-resonant, rounding may make the square negative.
     fn detuning_shift(&self, g: f64, b: f64) -> f64 {
@@ -360,12 +343,10 @@ impl SlowFlow {
 /// All real roots of a polynomial, ascending; coefficients by rising power. A double root counts once. Between two turning points there
 /// is at most one root, so the derivative brackets them all.
 fn real_roots(coefficients: &[f64]) -> Vec<f64> {
-    let Some(degree) = coefficients.iter().rposition(|c| *c != 0.0) else {
+    let degree = coefficients.iter().rposition(|c| *c != 0.0);
+    let Some(degree) = degree.filter(|degree| *degree > 0) else {
         return Vec::new();
     };
-    if degree == 0 {
-        return Vec::new();
-    }
     let coefficients = &coefficients[..=degree];
     let derivative: Vec<f64> = coefficients
         .iter()
