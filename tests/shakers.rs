@@ -4,7 +4,7 @@ mod reference;
 
 use lovines::host::Equations;
 use lovines::{
-    Amplifier, Cavity, Drive, Excitation, Parameters, Plant, Row, Shaker, ShakerRows, Structure, StructureState, Wall,
+    Amplifier, Cavity, Drive, Excitation, Parameters, Plant, Row, Shaker, ShakerRows, Structure, StructureState,
 };
 use serde_json::Value;
 
@@ -84,19 +84,13 @@ impl Reference {
         let first = number(&self.scene["K"][0][0]).sqrt();
         let currents = self.rows.iter().map(|row| row[row.len() - 3].abs());
         let largest = currents.fold(0.0, f64::max);
-        let (mut taken, mut worst) = (0.0, 0f64);
-        for (until, expected) in self.steps.iter().zip(&self.rows) {
-            let (count, length) = match parts {
-                0 => (1, (until - taken) * self.step),
-                _ => ((until - taken) as u32 * parts, self.step / f64::from(parts)),
-            };
-            taken = *until;
-            for _ in 0..count {
-                plant.advance_within(limit, drive, length).unwrap();
-            }
+        let advance = |plant: &mut Plant<Structure>, length: f64| {
+            plant.advance_within(limit, drive, length).unwrap();
+        };
+        let error = |plant: &Plant<Structure>, expected: &[f64]| {
             let points: Vec<_> = rows.iter().map(|row| plant.point(row)).collect();
             let (n, state) = (points.len(), plant.state());
-            let [.., current, impacts, wall] = expected[..] else {
+            let [.., current, _, _] = expected[..] else {
                 unreachable!()
             };
             let mut errors: Vec<f64> = Vec::new();
@@ -116,13 +110,10 @@ impl Reference {
                 of_current = of_current.max((voltage - expected).abs() / (resistance * largest));
             }
             let error = errors.iter().fold(0f64, |worst, error| worst.max(error.abs()));
-            worst = worst.max(error / plant.parameters().half_width).max(of_current);
-            if self.scene.get("chatter").is_none() {
-                assert_eq!(plant.totals().impacts, impacts as u64, "t = {}", expected[0]);
-            }
-            assert_eq!(plant.contact().map_or(0.0, Wall::sign), wall, "t = {}", expected[0]);
-        }
-        worst
+            of_current.max(error / plant.parameters().half_width)
+        };
+        let errors = self.follow(parts, &mut plant, advance, error);
+        errors.into_iter().fold(0.0, f64::max)
     }
 }
 

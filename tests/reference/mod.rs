@@ -1,6 +1,7 @@
 //! The references of this folder, as JSON has them.
 #![allow(dead_code)] // each test uses a part of it
 
+use lovines::{Plant, Structure, Wall};
 use serde_json::Value;
 
 /// A number, or the decimal digits of one.
@@ -49,5 +50,34 @@ impl Reference {
             scene: found["scene"].take(),
             rows,
         }
+    }
+
+    /// The error that `error` finds at every row, in steps of `1/parts` of the reference's, or, with `parts` of 0, in one step per row.
+    /// Impacts and contact are the reference's; how many impacts a chatter has depends on where it is cut.
+    pub fn follow(
+        &self,
+        parts: u32,
+        plant: &mut Plant<Structure>,
+        advance: impl Fn(&mut Plant<Structure>, f64),
+        error: impl Fn(&Plant<Structure>, &[f64]) -> f64,
+    ) -> Vec<f64> {
+        let mut taken = 0.0;
+        let mut after = |(until, row): (&f64, &Vec<f64>)| {
+            let (count, length) = match parts {
+                0 => (1, (until - taken) * self.step),
+                _ => ((until - taken) as u32 * parts, self.step / f64::from(parts)),
+            };
+            taken = *until;
+            for _ in 0..count {
+                advance(plant, length);
+            }
+            let [.., impacts, wall] = row[..] else { unreachable!() };
+            if self.scene.get("chatter").is_none() {
+                assert_eq!(plant.totals().impacts, impacts as u64, "t = {}", row[0]);
+            }
+            assert_eq!(plant.contact().map_or(0.0, Wall::sign), wall, "t = {}", row[0]);
+            error(plant, row)
+        };
+        self.steps.iter().zip(&self.rows).map(&mut after).collect()
     }
 }
