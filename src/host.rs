@@ -84,21 +84,6 @@ impl fmt::Display for InvalidHost {
 
 impl core::error::Error for InvalidHost {}
 
-/// The matrices of a structure with `n` degrees of freedom, row by row: `M q'' + C q' + K q = K i e + C i e'`, or `= d F`.
-#[derive(Clone, Copy, Debug)]
-pub struct Matrices<'a> {
-    /// `M`, kg.
-    pub mass: &'a [Vec<f64>],
-    /// `C`, N s/m.
-    pub damping: &'a [Vec<f64>],
-    /// `K`, N/m.
-    pub stiffness: &'a [Vec<f64>],
-    /// The row `p` of the cavity: its displacement is `p q`.
-    pub cavity: &'a [f64],
-    /// For a base: the displacements `i` of the structure per displacement of the base. For a force: the row `d` of its point.
-    pub drive: &'a [f64],
-}
-
 /// A first-order state `z` beside `n` degrees of freedom `q`, such as the current of a coil: `z' = b u - sum of rates z - velocity q'`, and the
 /// structure gets the forces `force z`.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,13 +109,18 @@ pub struct FirstOrderState {
 pub enum Equations {
     /// [`Host::from_modes`].
     Modes(Vec<Mode>),
-    /// [`Host::from_matrices`]; the fields are those of [`Matrices`].
-    #[allow(missing_docs)]
+    /// The matrices of `n` degrees of freedom, row by row: `M q'' + C q' + K q = K i e + C i e'`, or `= d F`. Coordinates of the host's points
+    /// are the degrees of freedom.
     Matrices {
+        /// `M`, kg.
         mass: Vec<Vec<f64>>,
+        /// `C`, N s/m.
         damping: Vec<Vec<f64>>,
+        /// `K`, N/m.
         stiffness: Vec<Vec<f64>>,
+        /// The row `p` of the cavity: its displacement is `p q`.
         cavity: Vec<f64>,
+        /// For a base: the displacements `i` of the structure per displacement of the base. For a force: the row `d` of its point.
         drive: Vec<f64>,
         /// First-order states beside the degrees of freedom: of a coil and an amplifier. Such a structure is driven by a force.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
@@ -142,7 +132,8 @@ impl Equations {
     /// The host.
     ///
     /// # Errors
-    /// As for [`Host::from_modes`] and [`Host::from_matrices`]; first-order states and a base as the excitation.
+    /// Modes: as for [`Host::from_modes`]. Matrices: unequal sizes, not symmetric, not positive definite (`M`, `K`) or with a negative eigenvalue
+    /// (`C`); first-order states and a base as the excitation; a cavity that nothing moves.
     pub fn host(&self, excitation: Excitation) -> Result<Host, InvalidHost> {
         match self {
             Self::Modes(modes) => Host::from_modes(excitation, modes),
@@ -150,8 +141,7 @@ impl Equations {
                 check(states.is_empty() || excitation == Excitation::Force, || {
                     "a structure with first-order states is driven by a force, not by its base".into()
                 })?;
-                let matrices = Matrices { mass, damping, stiffness, cavity, drive };
-                Host::with_first_order(excitation, &matrices, states)
+                Host::from_matrices(excitation, [mass, damping, stiffness], [cavity, drive], states)
             }
         }
     }
@@ -315,27 +305,21 @@ impl Host {
         expansion: Option<Expansion>,
     ) -> Result<Self, InvalidHost> {
         let (shapes, to_modal) = shapes.unzip();
-        let cavity = sections.iter().map(|section| section.cavity).collect();
-        Self {
+        check(!sections.is_empty(), || {
+            "the structure has no mode; it needs at least one".into()
+        })?;
+        check(mobility(&sections) > 0.0, || {
+            "the cavity is at a node of every mode; no impact can act on the structure there".into()
+        })?;
+        Ok(Self {
             excitation,
+            cavity: sections.iter().map(|section| section.cavity).collect(),
             sections,
             modal,
             shapes,
             to_modal,
-            cavity,
             expansion,
-        }
-        .checked()
-    }
-
-    fn checked(self) -> Result<Self, InvalidHost> {
-        check(!self.sections.is_empty(), || {
-            "the structure has no mode; it needs at least one".into()
-        })?;
-        check(self.mobility() > 0.0, || {
-            "the cavity is at a node of every mode; no impact can act on the structure there".into()
-        })?;
-        Ok(self)
+        })
     }
 
     /// What drives it.
@@ -415,11 +399,6 @@ impl Section {
     pub fn steady(&self, omega: f64) -> [Complex64; 2] {
         self.driven(omega).map(|state| state / self.stiffness(omega))
     }
-
-    /// Steady `(x, v)` per unit of a harmonic force at the cavity.
-    fn steady_of_cavity_force(&self, omega: f64) -> [Complex64; 2] {
-        self.kicked(omega).map(|state| state / self.stiffness(omega))
-    }
 }
 
 fn check(valid: bool, message: impl FnOnce() -> String) -> Result<(), InvalidHost> {
@@ -438,29 +417,21 @@ const SYMMETRIC: f64 = 1e-9;
 const FORM_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl Host {
-    /// A host with these matrices. Coordinates of its points are the degrees of freedom.
-    ///
-    /// # Errors
-    /// Matrices of unequal size, not symmetric, not positive definite (`M`, `K`) or with a negative eigenvalue (`C`); a cavity that nothing
-    /// moves.
-    pub fn from_matrices(excitation: Excitation, matrices: &Matrices) -> Result<Self, InvalidHost> {
-        Self::with_first_order(excitation, matrices, &[])
-    }
-
-    /// The same with first-order states beside it, for a drive that is not a base.
-    pub(crate) fn with_first_order(
+    /// The host of [`Equations::Matrices`].
+    fn from_matrices(
         excitation: Excitation,
-        matrices: &Matrices,
+        [mass, damping, stiffness]: [&[Vec<f64>]; 3],
+        [cavity, drive]: [&[f64]; 2],
         states: &[FirstOrderState],
     ) -> Result<Self, InvalidHost> {
-        let n = matrices.mass.len();
+        let n = mass.len();
         check(n > 0, || {
             "the structure has no degree of freedom; it needs at least one".into()
         })?;
-        let mass = symmetric("M (mass matrix)", matrices.mass, n)?;
-        let damping = symmetric("C (damping matrix)", matrices.damping, n)?;
-        let stiffness = symmetric("K (stiffness matrix)", matrices.stiffness, n)?;
-        for (name, row) in [("the cavity", matrices.cavity), ("the drive", matrices.drive)] {
+        let mass = symmetric("M (mass matrix)", mass, n)?;
+        let damping = symmetric("C (damping matrix)", damping, n)?;
+        let stiffness = symmetric("K (stiffness matrix)", stiffness, n)?;
+        for (name, row) in [("the cavity", cavity), ("the drive", drive)] {
             check(row.len() == n && row.iter().all(|entry| entry.abs() <= 1e50), || {
                 format!(
                     "the row of {name} has {} entries; it needs {n} finite numbers, one per degree of freedom",
@@ -482,10 +453,7 @@ impl Host {
         let to_modal = shapes.tr_mul(&mass);
         let column = |n: usize| shapes.column(n);
         let form = |a: &DMatrix<f64>, i: usize, j: usize| form(a, column(i).as_slice(), column(j).as_slice());
-        let (row, drive) = (
-            DVector::from_row_slice(matrices.cavity),
-            DVector::from_row_slice(matrices.drive),
-        );
+        let (row, drive) = (DVector::from_row_slice(cavity), DVector::from_row_slice(drive));
         let project = |x: &DVector<f64>| shapes.tr_mul(x);
         let natural = quotients(&stiffness, &mass, &shapes);
         let rates = quotients(&damping, &mass, &shapes);
@@ -581,11 +549,8 @@ impl Host {
 
     /// Steady value of a sum over the sections per unit of a harmonic force at the cavity, such as m/N.
     pub fn frequency_response_to_cavity(&self, row: &[[f64; 2]], omega: f64) -> Complex64 {
-        let steady = self
-            .sections
-            .iter()
-            .map(|section| section.steady_of_cavity_force(omega));
-        response(row, steady)
+        let steady = |section: &Section| section.kicked(omega).map(|state| state / section.stiffness(omega));
+        response(row, self.sections.iter().map(steady))
     }
 
     /// The row of the cavity.
@@ -1133,14 +1098,9 @@ mod tests {
             vec![-0.02, 0.3 + coupling, 0.1],
             vec![0.0, 0.1, 0.2 + 40.0 * coupling],
         ];
-        let matrices = Matrices {
-            mass: &mass,
-            damping: &damping,
-            stiffness: &stiffness,
-            cavity: &[1.0, 0.2, 0.0],
-            drive: &[1.0, 1.0, 0.3],
-        };
-        Host::from_matrices(excitation, &matrices).unwrap()
+        let (cavity, drive, states) = (vec![1.0, 0.2, 0.0], vec![1.0, 1.0, 0.3], vec![]);
+        let equations = Equations::Matrices { mass, damping, stiffness, cavity, drive, states };
+        equations.host(excitation).unwrap()
     }
 
     #[test]
@@ -1195,18 +1155,15 @@ mod tests {
         assert!(refused(&[Mode { cavity: f64::NAN, ..mode }]).contains("finite"));
         let of = |mass: [[f64; 2]; 2], stiffness: [[f64; 2]; 2], damping: [[f64; 2]; 2]| {
             let rows = |matrix: [[f64; 2]; 2]| matrix.map(|row| row.to_vec()).to_vec();
-            let (mass, stiffness, damping) = (rows(mass), rows(stiffness), rows(damping));
-            let (cavity, drive) = (&[1.0, 0.0], &[0.0, 1.0]);
-            let matrices = Matrices {
-                mass: &mass,
-                damping: &damping,
-                stiffness: &stiffness,
-                cavity,
-                drive,
+            let equations = Equations::Matrices {
+                mass: rows(mass),
+                damping: rows(damping),
+                stiffness: rows(stiffness),
+                cavity: vec![1.0, 0.0],
+                drive: vec![0.0, 1.0],
+                states: vec![],
             };
-            Host::from_matrices(Excitation::Force, &matrices)
-                .unwrap_err()
-                .to_string()
+            equations.host(Excitation::Force).unwrap_err().to_string()
         };
         let (unit, zero) = ([[1.0, 0.0], [0.0, 1.0]], [[0.0; 2]; 2]);
         assert!(of([[1.0, 0.1], [0.0, 1.0]], unit, zero).contains("entry (2, 1)"));

@@ -27,7 +27,7 @@ pub const MODEL_DESCRIPTION: &str = include_str!("../modelDescription.xml");
 
 pub use base_motion::{BaseMotion, Drive};
 pub use contact::Wall;
-pub use host::{Excitation, Host, InvalidHost, Matrices, Mode, Row, Section};
+pub use host::{Excitation, Host, InvalidHost, Mode, Row, Section};
 pub use parameters::{Cavity, InvalidValue, Parameters, Restitution};
 pub use plant::{Event, Outcome, Plant, State, Totals};
 pub use primary::{Primary, Single};

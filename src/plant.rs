@@ -428,13 +428,6 @@ pub struct Saved<S = ()> {
     primary: S,
 }
 
-impl<S> Saved<S> {
-    /// The state of a structure's sections; nothing for one oscillator.
-    pub fn primary(&self) -> &S {
-        &self.primary
-    }
-}
-
 impl<P: Primary> Plant<P> {
     /// The plant without what can be computed again.
     pub fn save(&self) -> Saved<P::State> {

@@ -11,7 +11,6 @@ use num_complex::Complex64;
 use crate::arithmetic::Sums;
 use crate::base_motion::{BaseMotion, Drive, shift};
 use crate::clearance::{Gap, Look};
-use crate::contact::Wall;
 use crate::flight::{FlightEnd, Sticking};
 use crate::forcing::Forcing;
 use crate::host::{Host, InvalidHost, Row, Section, mobility};
@@ -884,13 +883,6 @@ impl Plant<Structure> {
         }
         let alone = self.primary.cavity(u, 0.0)[2];
         -m * (alone - gravity) / (1.0 + m * self.primary.mobility)
-    }
-
-    /// The wall that pushes, if it does; its force on the particle per mass is positive at `w = +b`, m/s².
-    pub fn push(&self) -> Option<(Wall, f64)> {
-        let wall = self.contact()?;
-        let force = self.force_at_cavity(drive_now(&self.moving.base));
-        Some((wall, -force / self.moving.system.parameters.particle_mass))
     }
 
     /// Mechanical energy, J: kinetic and elastic energy of the structure (relative to a base at its displacement now), kinetic energy of the

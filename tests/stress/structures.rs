@@ -2,9 +2,10 @@
 
 use crate::figures::{ANY, Figures};
 use crate::scenes::decades;
+use lovines::host::Equations;
 use lovines::plant::{MOST_IMPACTS, MOST_RELEASES};
 use lovines::{
-    Cavity, Drive, Event, Excitation, Host, Matrices, Mode, Parameters, Plant, Restitution, Structure, StructureState,
+    Cavity, Drive, Event, Excitation, Host, Mode, Parameters, Plant, Restitution, Structure, StructureState,
 };
 use proptest::prelude::*;
 use proptest::strategy::BoxedStrategy;
@@ -146,14 +147,15 @@ impl Scene {
         let damper = square(&|i, j| self.coupling * weight(i) * weight(j));
         let modal = diagonal(&|mode| 2.0 * mode.zeta * mode.omega);
         let row = |of: fn(&Mode) -> f64| -> Vec<f64> { self.modes.iter().map(of).collect() };
-        let matrices = Matrices {
-            mass: &diagonal(&|_| 1.0),
-            damping: &square(&|i, j| modal[i][j] + damper[i][j]),
-            stiffness: &diagonal(&|mode| mode.omega * mode.omega),
-            cavity: &row(|mode| mode.cavity),
-            drive: &row(|mode| mode.drive),
+        let equations = Equations::Matrices {
+            mass: diagonal(&|_| 1.0),
+            damping: square(&|i, j| modal[i][j] + damper[i][j]),
+            stiffness: diagonal(&|mode| mode.omega * mode.omega),
+            cavity: row(|mode| mode.cavity),
+            drive: row(|mode| mode.drive),
+            states: vec![],
         };
-        Host::from_matrices(self.excitation, &matrices).expect("a valid structure")
+        equations.host(self.excitation).expect("a valid structure")
     }
 
     fn plant(&self) -> Plant<Structure> {
@@ -239,11 +241,12 @@ fn once(s: &Scene, saved: bool, figures: &mut Figures) -> Plant<Structure> {
             let outside = ((state.q1 - state.q2 - plus).max(minus.mul_add(-1.0, state.q2 - state.q1)) - rounding)
                 / (0.5 * (plus + minus));
             figures.largest("outside its cavity inside steps by, in half-widths", outside, 1e-11);
-            if let Some((wall, push)) = looked.push()
+            if let Some(wall) = looked.contact()
                 && s.parameters.cavity.kinetic_friction == 0.0
             {
-                let size = looked.point(looked.host().cavity_row())[2].abs() + 1.0;
-                pulls = pulls.max(-wall.sign() * push / size);
+                let acceleration = looked.point(looked.host().cavity_row())[2];
+                let push = acceleration - looked.constant_accelerations().0;
+                pulls = pulls.max(-wall.sign() * push / (acceleration.abs() + 1.0));
             }
         }
         let state = plant.state();
@@ -298,8 +301,6 @@ pub fn follow(scene: &Scene, figures: &mut Figures) {
         once(&scene, false, figures),
         once(&scene, true, &mut Figures::default()),
     );
-    let differs = plant.state() != other.state()
-        || plant.totals() != other.totals()
-        || plant.save().primary() != other.save().primary();
+    let differs = format!("{:?}", plant.save()) != format!("{:?}", other.save());
     figures.count("runs with other bits from saved states", differs, 0.0);
 }

@@ -5,7 +5,8 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use lovines::{Cavity, Drive, Excitation, Host, Matrices, Mode, Parameters, Plant, Structure, StructureState};
+use lovines::host::Equations;
+use lovines::{Cavity, Drive, Excitation, Host, Mode, Parameters, Plant, Structure, StructureState};
 use nalgebra::{Complex, DMatrix, DVector};
 use rand_chacha::{
     ChaCha8Rng,
@@ -103,14 +104,8 @@ fn by_matrices(random: &mut ChaCha8Rng, excitation: Excitation) -> Host {
         Excitation::Base => vec![1.0; count],
         Excitation::Force => unit(pick(random, count)),
     };
-    let matrices = Matrices {
-        mass: &mass,
-        damping: &damping,
-        stiffness: &stiffness,
-        cavity: &cavity,
-        drive: &drive,
-    };
-    Host::from_matrices(excitation, &matrices).unwrap()
+    let equations = Equations::Matrices { mass, damping, stiffness, cavity, drive, states: vec![] };
+    equations.host(excitation).unwrap()
 }
 
 /// A random structure. The particle has 0.1 to 3 % of the modal mass of the driven mode.

@@ -7,7 +7,7 @@ use std::ptr::null;
 
 use fmi2_boundary::{Fmu, Interface, Master, call, refused};
 use fmi2_component::Status;
-use lovines::host::Matrices;
+use lovines::host::Equations;
 use lovines::{Cavity, Drive, Excitation, Host, Mode, Parameters, Plant, Structure, StructureState};
 
 /// Value references: m, b, r, signal, amplitude, omega, w, the drive's total, tilt.
@@ -53,18 +53,16 @@ fn chain() -> String {
 }
 
 fn chain_host() -> (Host, [[f64; 2]; 2]) {
-    let [mass, damping, stiffness] = [MASS, DAMPING, STIFFNESS].map(|matrix| matrix.map(|row| row.to_vec()));
-    let matrices = Matrices {
-        mass: &mass,
-        damping: &damping,
-        stiffness: &stiffness,
-        cavity: &[1.0, 0.0],
-        drive: &[1.0, 1.0],
+    let rows = |matrix: [[f64; 2]; 2]| matrix.map(|row| row.to_vec()).to_vec();
+    let equations = Equations::Matrices {
+        mass: rows(MASS),
+        damping: rows(DAMPING),
+        stiffness: rows(STIFFNESS),
+        cavity: vec![1.0, 0.0],
+        drive: vec![1.0, 1.0],
+        states: vec![],
     };
-    (
-        Host::from_matrices(Excitation::Base, &matrices).unwrap(),
-        [[1.0, 0.0], [0.0, 1.0]],
-    )
+    (equations.host(Excitation::Base).unwrap(), [[1.0, 0.0], [0.0, 1.0]])
 }
 
 fn frame_host() -> (Host, [[f64; 2]; 2]) {
