@@ -5,10 +5,10 @@ use std::f64::consts::{PI, TAU};
 use lovines::{Event, Plant, Wall};
 use phase_lock::Output;
 use vines_bench::experiment::{ExperimentError, exchange};
-use vines_bench::live::{Decay, HarmonicMotion, LastImpacts};
-use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Sensors};
+use vines_bench::live::{Decay, HarmonicMotion};
+use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Rig, Sensors};
 use vines_bench::scene::Scene;
-use vines_model::regime::{Impact, Regime};
+use vines_model::regime::Regime;
 
 use crate::message::Message;
 use crate::rig::NoisyRig;
@@ -294,24 +294,17 @@ const MOST_PERIODS: f64 = 1000.0;
 pub fn regime_at(scene: &Scene, sigma: f64, g: f64) -> Result<Regime, Message> {
     let d = scene.dimensionless();
     let omega = d.omega(sigma);
-    let drive = lovines::Drive::harmonic(d.amplitude(g), omega);
-    let mut plant = Plant::new(scene.plant, scene.start)?;
-    let mut impacts = LastImpacts::default();
+    let drive = Drive { omega, amplitude: d.amplitude(g), ..Drive::default() };
+    let mut rig = NoisyRig::new(Plant::new(scene.plant, scene.start)?, 0.0);
     // The amplitude relaxes by e in 1/(pi epsilon lambda) periods.
     let periods = (RELAXATIONS / (PI * d.epsilon * d.lambda)).min(MOST_PERIODS) as usize;
-    for n in 0..periods {
-        let mut count = |event: Event| {
-            if let Event::Impact { t, velocity, .. } = event {
-                impacts.0.push(Impact { time: TAU * n as f64 + omega * t, velocity });
-            }
-        };
-        plant.advance_with(drive, TAU / omega, &mut count as &mut dyn FnMut(Event))?;
-        impacts.trim();
+    for _ in 0..periods {
+        rig.advance(drive, TAU / omega).map_err(ExperimentError::from)?;
     }
     // A slow particle may be silent for a while.
-    let last = impacts.0.last().map_or(0.0, |last| last.time);
+    let last = rig.impacts.0.last().map_or(0.0, |last| last.time);
     Ok(match last < 0.5 * TAU * periods as f64 {
         true => Regime::NoImpacts,
-        false => impacts.regime(last),
+        false => rig.impacts.regime(last),
     })
 }
