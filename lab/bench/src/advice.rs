@@ -137,7 +137,8 @@ mod tests {
             let mut sample = |n: usize| {
                 let omega = omega0 * if n == 0 { from } else { to };
                 let amplitude = scene.amplitude;
-                let drive = Drive { omega, amplitude, displacement: amplitude * phase.sin() };
+                let displacement = amplitude * phase.sin();
+                let drive = Drive { omega, amplitude, displacement, is_held: false };
                 let sensors = rig.sense().unwrap();
                 rig.advance(drive, plan.knowledge.sample_time).unwrap();
                 phase += omega * plan.knowledge.sample_time;

@@ -311,7 +311,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         let before_drive = |sample: &Sample| {
             let command = checked(sample.command, target.units.reference)?;
             samples.push(*sample);
-            let is_off = is_off(command.drive);
+            let is_off = command.drive.is_off();
             if stage == Stage::Decaying && !is_off {
                 let commanded = drive_in_words(command.drive, plan);
                 return Err(ExperimentError::Refused(format!(
@@ -328,7 +328,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         if let Some((last, command)) = self.samples.last_mut().zip(self.rig.shaker_command()) {
             last.shaker_command = command;
         }
-        self.driven = !is_off(command.drive);
+        self.driven = !command.drive.is_off();
         self.taken += 1;
         self.last = command;
         self.periods += command.drive.omega * self.sample_time / TAU;
@@ -353,7 +353,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
         let ramp = self.plan.ramp;
         for _ in 0..ramp.max(1) {
             self.sample(Stage::Releasing)?;
-            if is_off(self.last.drive) {
+            if self.last.drive.is_off() {
                 return Ok(self.taken - 1);
             }
         }
@@ -421,7 +421,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             let reference = self.plan.knowledge.target.units.reference;
             command = checked(Command { drive: falling.unwrap_or_default(), ..asked }, reference)?;
             self.rig.advance(command.drive, self.sample_time)?;
-            self.driven = !is_off(command.drive);
+            self.driven = !command.drive.is_off();
         }
         Ok(())
     }
@@ -480,11 +480,6 @@ impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
     }
 }
 
-/// Whether a drive moves nothing: neither a rig that takes its amplitude nor one that takes its samples.
-fn is_off(drive: Drive) -> bool {
-    drive.amplitude == 0.0 && drive.displacement == 0.0
-}
-
 /// Refuses a drive or a response beyond the limits of the scene, before the rig gets the drive.
 fn guard(config: &Config, target: &Target, response: f64, drive: Drive) -> Result<(), ExperimentError> {
     let Config { amplitude_max, response_max, omega_min, omega_max, .. } = *config;
@@ -522,7 +517,7 @@ fn guard(config: &Config, target: &Target, response: f64, drive: Drive) -> Resul
 
 /// A command with values that a rig and an identification can take; `reference`: the unit of its drive in messages.
 fn checked(command: Command, reference: Unit) -> Result<Command, ExperimentError> {
-    let Drive { omega, amplitude, displacement } = command.drive;
+    let Drive { omega, amplitude, displacement, .. } = command.drive;
     let angular = |value, unit| Quantity { value, unit };
     for (name, value, is_signed) in [
         ("omega", angular(omega, "rad/s"), false),

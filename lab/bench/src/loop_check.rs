@@ -422,7 +422,8 @@ impl<'a, R: Rig + ?Sized> OpenLoop<'a, R> {
             self.has_base |= sensors.reference.is_some();
             self.readings
                 .push([phase, sensors.response, sensors.reference.unwrap_or(0.0)]);
-            let drive = Drive { omega, amplitude, displacement: amplitude * phase.sin() };
+            let displacement = amplitude * phase.sin();
+            let drive = Drive { omega, amplitude, displacement, is_held: false };
             self.rig.advance(drive, self.step)?;
             self.phase += omega * self.step;
         }

@@ -27,9 +27,16 @@ pub struct Drive {
     pub amplitude: f64,
     /// Present value, for a rig that is driven by samples.
     pub displacement: f64,
+    /// Whether the rig holds this value for the sample period, instead of a sine of its own oscillator.
+    pub is_held: bool,
 }
 
 impl Drive {
+    /// Whether it moves nothing: neither a rig that takes its amplitude nor one that takes its samples.
+    pub fn is_off(self) -> bool {
+        (self.amplitude, self.displacement) == (0.0, 0.0)
+    }
+
     /// This drive in another unit.
     #[must_use]
     pub fn map(self, convert: impl Fn(f64) -> f64) -> Self {
@@ -82,12 +89,10 @@ pub trait Rig {
     fn sense(&mut self) -> Result<Sensors, RigError>;
 
     /// Drives the rig for one sample period of `step` seconds.
+    ///
+    /// # Errors
+    /// Errors of the implementation; [`RigError::NoHold`] of a rig that holds no samples.
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError>;
-
-    /// Holds the base at the displacement of the drive for one sample period of `step` seconds.
-    fn hold(&mut self, _drive: Drive, _step: f64) -> Result<(), RigError> {
-        Err(RigError::NoHold)
-    }
 
     /// The ground truth, if the rig is a simulation.
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
@@ -119,11 +124,6 @@ pub trait RigStage {
         self.inner().advance(drive, step)
     }
 
-    /// [`Rig::hold`].
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.inner().hold(drive, step)
-    }
-
     /// [`Rig::ground_truth`].
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         self.inner().ground_truth()
@@ -137,10 +137,6 @@ impl<S: RigStage> Rig for S {
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         RigStage::advance(self, drive, step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        RigStage::hold(self, drive, step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
@@ -168,7 +164,7 @@ impl From<phase_lock::Output> for Command {
     fn from(output: phase_lock::Output) -> Self {
         let phase_lock::Output { omega, amplitude, drive: displacement, .. } = output;
         Self {
-            drive: Drive { omega, amplitude, displacement },
+            drive: Drive { omega, amplitude, displacement, is_held: false },
             phase_error: output.phase_error,
             settled: Some(output.settled),
             state: Some(output.state),

@@ -98,14 +98,8 @@ pub(super) fn ended(signal: Signal) -> String {
 
 // A rig that the thread can reach.
 
-/// The last command that a rig has got.
-#[derive(Clone, Copy, PartialEq)]
-enum Last {
-    Zero,
-    Driven,
-    Held,
-    Failed,
-}
+/// The last drive that a rig has got; `None`: it has failed.
+type Last = Option<Drive>;
 
 /// A rig that is not a simulation in this program, and that [`zeroed`] can reach.
 struct Reachable<R> {
@@ -127,28 +121,10 @@ fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Makes a rig reachable for a drive of zero upon a signal. `sample_time` in s.
 pub(super) fn reachable(rig: impl Rig + Send + 'static, sample_time: f64) -> Box<dyn Rig> {
-    let (rig, last) = (Arc::new(Mutex::new(rig)), Arc::new(Mutex::new(Last::Zero)));
+    let (rig, last) = (Arc::new(Mutex::new(rig)), Arc::new(Mutex::new(Some(Drive::default()))));
     let weak = Arc::downgrade(&rig);
     *lock(&RIG) = Some(Brake { rig: weak, last: Arc::clone(&last), sample_time });
     Box::new(Reachable { rig, last })
-}
-
-impl<R: Rig> Reachable<R> {
-    fn command(
-        &mut self,
-        drive: Drive,
-        kind: Last,
-        call: impl FnOnce(&mut R) -> Result<(), RigError>,
-    ) -> Result<(), RigError> {
-        let result = call(&mut lock(&self.rig));
-        let is_zero = (drive.amplitude, drive.displacement) == (0.0, 0.0);
-        *lock(&self.last) = match &result {
-            Err(_) => Last::Failed,
-            Ok(()) if is_zero => Last::Zero,
-            Ok(()) => kind,
-        };
-        result
-    }
 }
 
 impl<R: Rig> Rig for Reachable<R> {
@@ -157,11 +133,9 @@ impl<R: Rig> Rig for Reachable<R> {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.command(drive, Last::Driven, |rig| rig.advance(drive, step))
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.command(drive, Last::Held, |rig| rig.hold(drive, step))
+        let result = lock(&self.rig).advance(drive, step);
+        *lock(&self.last) = result.is_ok().then_some(drive);
+        result
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
@@ -173,19 +147,20 @@ impl Brake {
     /// Commands zero, as the last command was given. A zero counts when the rig has answered.
     fn zero(self) -> Result<(), String> {
         let last = *lock(&self.last);
+        let is_off = last.is_some_and(Drive::is_off);
         let Some(rig) = self.rig.upgrade() else {
-            return match last {
-                Last::Zero => Ok(()),
-                _ => Err("the rig has failed".into()),
+            return if is_off {
+                Ok(())
+            } else {
+                Err("the rig has failed".into())
             };
         };
         // A call that never returns holds the lock, and then the caller does not wait for this.
         let mut rig = lock(&rig);
-        let zero = Drive::default();
-        let commanded = match last {
-            Last::Zero => Ok(()),
-            Last::Held => rig.hold(zero, self.sample_time),
-            _ => rig.advance(zero, self.sample_time),
+        let is_held = last.is_some_and(|drive| drive.is_held);
+        let commanded = match is_off {
+            true => Ok(()),
+            false => rig.advance(Drive { is_held, ..Drive::default() }, self.sample_time),
         };
         commanded
             .and_then(|()| rig.sense())

@@ -26,12 +26,6 @@ impl<F: FnMut(Sample, f64) + 'static> Tap<F> {
     pub(super) fn around(rig: Box<dyn Rig>, on_sample: F) -> Box<dyn Rig> {
         Box::new(Self { rig, now: no_sample(), on_sample })
     }
-
-    fn show(&mut self, drive: Drive, step: f64) {
-        self.now.command.drive = drive;
-        (self.on_sample)(self.now, step);
-        self.now.time += step;
-    }
 }
 
 impl<F: FnMut(Sample, f64) + 'static> RigStage for Tap<F> {
@@ -45,13 +39,10 @@ impl<F: FnMut(Sample, f64) + 'static> RigStage for Tap<F> {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.show(drive, step);
+        self.now.command.drive = drive;
+        (self.on_sample)(self.now, step);
+        self.now.time += step;
         self.rig.advance(drive, step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.show(drive, step);
-        self.rig.hold(drive, step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -208,7 +208,7 @@ impl View {
         let Numbered { sample, step, .. } = now;
         let Sample { time, sensors, command, ground_truth, .. } = sample;
         let (drive, before) = (command.drive, self.last.sample.command.drive);
-        let [driven, was_driven] = [drive, before].map(|drive| drive.amplitude != 0.0 || drive.displacement != 0.0);
+        let [driven, was_driven] = [drive, before].map(|drive| !drive.is_off());
         let follows = now.number == self.last.number + 1;
         // A window of samples without gaps, under a drive or without one.
         if !follows || driven != was_driven || self.fit.ended {

@@ -129,6 +129,7 @@ impl FmuController {
             omega: fmu.get(self.omega)?,
             amplitude: fmu.get(self.amplitude)?,
             displacement: fmu.get_if(self.displacement)?.unwrap_or(0.0),
+            is_held: false,
         };
         // A phase that cannot be measured now is none to judge by.
         let measured = fmu.get_if(self.phase_measured)? != Some(0.0);

@@ -190,21 +190,20 @@ impl Rig for FmuRig {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let Some(inputs) = self.inputs else {
+        let Drive { omega, amplitude, mut displacement, is_held } = drive;
+        if let Some([of_omega, of_amplitude]) = self.inputs.filter(|_| !is_held) {
+            self.fmu.set(of_omega, omega)?;
+            self.fmu.set(of_amplitude, amplitude)?;
+            return Ok(self.fmu.step(step)?);
+        }
+        if !is_held {
             // The middle of the step: the mean of what is held is then in time.
-            let displacement = drive.amplitude * (self.phase + 0.5 * drive.omega * step).sin();
-            self.phase = (self.phase + drive.omega * step) % TAU;
-            return self.hold(Drive { displacement, ..drive }, step);
-        };
-        self.fmu.set(inputs[0], drive.omega)?;
-        self.fmu.set(inputs[1], drive.amplitude)?;
-        Ok(self.fmu.step(step)?)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.fmu.set(self.held.ok_or(RigError::NoHold)?, drive.displacement)?;
-        if let Some([_, amplitude]) = self.inputs {
-            self.fmu.set(amplitude, 0.0)?;
+            displacement = amplitude * (self.phase + 0.5 * omega * step).sin();
+            self.phase = (self.phase + omega * step) % TAU;
+        }
+        self.fmu.set(self.held.ok_or(RigError::NoHold)?, displacement)?;
+        if let Some([_, of_amplitude]) = self.inputs {
+            self.fmu.set(of_amplitude, 0.0)?;
         }
         Ok(self.fmu.step(step)?)
     }

@@ -432,6 +432,9 @@ impl<T: Transport> Rig for HelicRig<T> {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        if drive.is_held {
+            return Err(RigError::NoHold);
+        }
         self.wanted = drive;
         self.phase = self.readings.phase();
         self.readings.advance(drive.omega * step / TAU);

@@ -288,7 +288,8 @@ impl Device {
         let values: Vec<f64> = sensors.chain([target, forcing, 0.0, turns, out, epoch]).collect();
         let packet = self.record(&values);
         let displacement = out * MILLI;
-        self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
+        self.rig
+            .advance(Drive { displacement, is_held: true, ..Drive::default() }, step)?;
         let turn = self.values("freq")[0] * step * TURN;
         self.phase = phase.wrapping_add(turn.round() as u32);
         self.ticks = self.ticks.wrapping_add(1);

@@ -119,7 +119,7 @@ fn damaged_answers_and_packets_never_make_the_host_panic() {
                 Drive {
                     omega: 50.0 + f64::from(n),
                     amplitude: 1e-4,
-                    displacement: 0.0,
+                    ..Drive::default()
                 },
                 step,
             )

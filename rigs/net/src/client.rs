@@ -240,11 +240,10 @@ impl NetRig {
         }
     }
 
-    fn drive(&mut self, drive: Drive, holds: bool, step: f64) -> Result<(), LinkError> {
+    fn drive(&mut self, drive: Drive, step: f64) -> Result<(), LinkError> {
         let command = Command { drive, ..Command::default() };
-        let mut frame = write_command(self.client.frame(Kind::Drive), &command);
-        frame.flags |= bit(flag::HOLD, holds);
-        self.client.send(frame)?;
+        self.client
+            .send(write_command(self.client.frame(Kind::Drive), &command))?;
         self.client.at += 1;
         // A rig that plays samples has no frequency: then a line is all that bridges a gap.
         self.readings.advance(drive.omega * step / TAU);
@@ -279,11 +278,7 @@ impl Rig for NetRig {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        Ok(self.drive(drive, false, step)?)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        Ok(self.drive(drive, true, step)?)
+        Ok(self.drive(drive, step)?)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

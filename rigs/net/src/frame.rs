@@ -202,8 +202,10 @@ pub(crate) fn read_reading(frame: &Frame) -> Reading {
 }
 
 pub(crate) fn write_command(frame: Frame, command: &Command) -> Frame {
-    let flags = bit(flag::SETTLED, command.settled == Some(true)) | bit(flag::NO_PHASE, command.phase_error.is_none());
-    let Drive { omega, amplitude, displacement } = command.drive;
+    let Drive { omega, amplitude, displacement, is_held } = command.drive;
+    let flags = bit(flag::SETTLED, command.settled == Some(true))
+        | bit(flag::NO_PHASE, command.phase_error.is_none())
+        | bit(flag::HOLD, is_held);
     // The state is counted from 1, so that 0 means that it is not reported.
     let state = command.state.map_or(0.0, |state| f64::from(state as u8) + 1.0);
     let fault = command.fault.map_or(0.0, |fault| f64::from(fault as u8));
@@ -216,7 +218,7 @@ pub(crate) fn read_command(frame: &Frame) -> Command {
     let [omega, amplitude, displacement, phase_error, state, fault] = frame.values;
     let (settled, state) = (frame.has(flag::SETTLED), LoopState::of_number(state as i32 - 1));
     Command {
-        drive: Drive { omega, amplitude, displacement },
+        drive: Drive { omega, amplitude, displacement, is_held: false },
         phase_error: (!frame.has(flag::NO_PHASE)).then_some(phase_error),
         // A controller that never says so reports no state either.
         settled: (settled || state.is_some()).then_some(settled),
@@ -438,7 +440,7 @@ mod tests {
             let reading = Reading { sensors: Sensors { response, reference }, ground_truth };
             let frame = write_reading(Frame::new(Kind::Hello, 1), &reading);
             prop_assert_eq!(read_reading(&Frame::decode(&frame.encode()).unwrap()), reading);
-            let drive = Drive { omega, amplitude, displacement };
+            let drive = Drive { omega, amplitude, displacement, is_held: false };
             let (state, fault) = (LoopState::of_number(state), Fault::of_number(fault));
             let settled = (settled || state.is_some()).then_some(settled);
             let command = Command { drive, phase_error, settled, state, fault };
@@ -484,7 +486,12 @@ mod tests {
             time: 0.25,
             ..Frame::new(Kind::Hello, 0x0102_0304_0506_0708)
         };
-        let drive = Drive { omega: 55.5, amplitude: 9e-5, displacement: -1e-5 };
+        let drive = Drive {
+            omega: 55.5,
+            amplitude: 9e-5,
+            displacement: -1e-5,
+            is_held: false,
+        };
         let (state, fault) = (LoopState::of_number(3), Fault::of_number(5));
         let command = Command {
             drive,

@@ -212,24 +212,13 @@ mod tests {
         readings: Readings,
         gap: Range<u64>,
         at: u64,
-        drive: (Drive, bool, f64),
+        drive: (Drive, f64),
     }
 
     impl Interrupted {
         fn apply(&mut self) -> Result<(), RigError> {
-            let (drive, holds, step) = self.drive;
-            match holds {
-                true => self.rig.hold(drive, step),
-                false => self.rig.advance(drive, step),
-            }
-        }
-
-        fn step(&mut self, drive: Drive, holds: bool, step: f64) -> Result<(), RigError> {
-            self.drive = (drive, holds, step);
-            self.readings.advance(drive.omega * step / TAU);
-            self.at += 1;
-            let is_lost = self.gap.contains(&(self.at - 1));
-            if is_lost { Ok(()) } else { self.apply() }
+            let (drive, step) = self.drive;
+            self.rig.advance(drive, step)
         }
     }
 
@@ -251,11 +240,11 @@ mod tests {
         }
 
         fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-            self.step(drive, false, step)
-        }
-
-        fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-            self.step(drive, true, step)
+            self.drive = (drive, step);
+            self.readings.advance(drive.omega * step / TAU);
+            self.at += 1;
+            let is_lost = self.gap.contains(&(self.at - 1));
+            if is_lost { Ok(()) } else { self.apply() }
         }
     }
 
@@ -280,7 +269,7 @@ mod tests {
                     readings: Readings::default(),
                     gap: from..from + lost,
                     at: 0,
-                    drive: (Drive::default(), false, scene.sample_time()),
+                    drive: (Drive::default(), scene.sample_time()),
                 };
                 let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
                 let mut rig = Chain::around(Box::new(rig), &scene);

@@ -71,13 +71,18 @@ impl Service {
             Role::Rig { max_amplitude, .. } => max_amplitude,
             Role::Controller => 0.0,
         };
-        let Drive { omega, amplitude, displacement } = read_command(frame).drive;
+        let Drive { omega, amplitude, displacement, .. } = read_command(frame).drive;
         let limits = [PI / self.sample_time, largest, largest];
         // The displacement has a sign.
         let sizes = [omega, amplitude, displacement.abs()];
         match (0..3).find(|&index| !(0.0..=limits[index]).contains(&sizes[index])) {
             Some(index) => Err(Refusal::Drive { index, value: frame.values[index], limit: limits[index] }),
-            None => Ok(Drive { omega, amplitude, displacement }),
+            None => Ok(Drive {
+                omega,
+                amplitude,
+                displacement,
+                is_held: frame.has(flag::HOLD),
+            }),
         }
     }
 }
@@ -356,7 +361,7 @@ impl Run {
                 Ok(held.map_err(Refusal::from)?)
             }
             (Served::Rig(_), Kind::Drive) => {
-                self.drive.set(self.service.drive(frame)?, frame.has(flag::HOLD));
+                self.drive.set(self.service.drive(frame)?);
                 self.advance(link)
             }
             _ => Err(Refusal::Unexpected.into()),
@@ -370,7 +375,7 @@ impl Run {
         self.counters.late += u64::from(is_old || frame.sequence < self.at);
         self.counters.malformed += u64::from(drive.is_none());
         if let Some(drive) = drive.filter(|_| !is_old) {
-            self.drive.set(drive, frame.has(flag::HOLD));
+            self.drive.set(drive);
             self.newest = frame.sequence;
             let start = || RealTimeClock::start(self.service.sample_time);
             self.clock.get_or_insert_with(start);
@@ -468,8 +473,6 @@ pub const RAMP_SAMPLES: u32 = 100;
 #[derive(Debug, Clone, Copy, Default)]
 struct Ramp {
     drive: Drive,
-    /// Whether the rig holds the displacement of the drive.
-    holds: bool,
     /// The displacement before that of the drive, m, and whether the drive has arrived since the last sample.
     before: f64,
     is_new: bool,
@@ -479,31 +482,26 @@ struct Ramp {
 
 impl Ramp {
     /// Sets a new drive; without effect after the shutdown.
-    fn set(&mut self, drive: Drive, holds: bool) {
+    fn set(&mut self, drive: Drive) {
         if self.left.is_none() {
             self.before = self.drive.displacement;
-            (self.drive, self.holds, self.is_new) = (drive, holds, true);
+            (self.drive, self.is_new) = (drive, true);
         }
     }
 
     /// Drives the rig for the next sample period of `step` seconds.
     fn apply(&mut self, rig: &mut dyn Rig, step: f64) -> Result<(), RigError> {
-        if self.holds && !self.is_new && self.left.is_none() {
+        if self.drive.is_held && !self.is_new && self.left.is_none() {
             self.extrapolate(step);
         }
         self.is_new = false;
-        let drive = self.next();
-        if self.holds {
-            rig.hold(drive, step)
-        } else {
-            rig.advance(drive, step)
-        }
+        rig.advance(self.next(), step)
     }
 
     /// Continues a sine of which the next displacement is late: a base that stops and jumps would be a disturbance of the structure.
     /// A drive without an amplitude is not known to be a sine.
     fn extrapolate(&mut self, step: f64) {
-        let Drive { omega, amplitude, displacement } = self.drive;
+        let Drive { omega, amplitude, displacement, .. } = self.drive;
         if amplitude > 0.0 {
             let next = 2.0 * (omega * step).cos() * displacement - self.before;
             self.before = displacement;
@@ -533,11 +531,7 @@ impl Ramp {
         };
         *left = left.saturating_sub(1);
         let share = f64::from(*left) / f64::from(RAMP_SAMPLES);
-        Drive {
-            omega: self.drive.omega,
-            amplitude: share * self.drive.amplitude,
-            displacement: share * self.drive.displacement,
-        }
+        self.drive.map(|value| share * value)
     }
 }
 
@@ -556,11 +550,8 @@ mod tests {
             Ok(Sensors { response: self.0, reference: None })
         }
 
-        fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
-            unreachable!()
-        }
-
-        fn hold(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+        fn advance(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+            assert!(drive.is_held);
             self.0 = drive.displacement;
             Ok(())
         }
@@ -569,23 +560,24 @@ mod tests {
     #[test]
     fn a_base_of_held_samples_follows_its_sine_where_no_sample_arrives() {
         let (mut ramp, mut base) = (Ramp::default(), Base::default());
+        let sample = |displacement| Drive { omega: 60.0, amplitude: 1e-4, displacement, is_held: true };
         for n in 0..140 {
             let displacement = 1e-4 * (0.06 * f64::from(n)).sin();
             if !(50..77).contains(&n) {
-                ramp.set(Drive { omega: 60.0, amplitude: 1e-4, displacement }, true);
+                ramp.set(sample(displacement));
             }
             ramp.apply(&mut base, 1e-3).unwrap();
             assert!((base.0 - displacement).abs() < 1e-12, "{n}");
         }
         // Samples that are not those of a sine: no displacement beyond the amplitude. Samples of an unknown motion are held.
         for displacement in [-1e-4, 1e-4] {
-            ramp.set(Drive { omega: 60.0, amplitude: 1e-4, displacement }, true);
+            ramp.set(sample(displacement));
         }
         for _ in 0..500 {
             ramp.apply(&mut base, 1e-3).unwrap();
             assert!(base.0.abs() <= 1e-4);
         }
-        ramp.set(Drive { displacement: 5e-5, ..Drive::default() }, true);
+        ramp.set(Drive { omega: 0.0, amplitude: 0.0, ..sample(5e-5) });
         (0..3).for_each(|_| ramp.apply(&mut base, 1e-3).unwrap());
         assert_eq!(base.0, 5e-5);
     }

@@ -496,7 +496,7 @@ mod tests {
             let overrides = settings.each_ref().map(|setting| setting.parse().unwrap());
             let scene = Scene::load(None, &overrides).unwrap();
             let omega = scene.dimensionless().omega(6.0 * share(4) - 3.0);
-            let drive = Drive { omega, amplitude: scene.amplitude, displacement: 0.0 };
+            let drive = Drive { omega, amplitude: scene.amplitude, ..Drive::default() };
             let knowledge = scene.knowledge();
             let knowledge = knowledge.measured(knowledge.linear);
             let step = scene.sample_time();

@@ -97,18 +97,6 @@ impl Chain {
             elapsed: 0.0,
         }
     }
-
-    /// Duration of a sample period of `step` seconds, whose end is not where it should be.
-    fn taken(&mut self, step: f64) -> f64 {
-        let mut late = 0.0;
-        if self.jitter > 0.0 {
-            late = self.jitter * normal(&mut self.random);
-        }
-        let taken = step * (1.0 + late - self.late);
-        self.late = late;
-        self.elapsed += taken;
-        taken
-    }
 }
 
 impl RigStage for Chain {
@@ -131,19 +119,20 @@ impl RigStage for Chain {
         Ok(oldest)
     }
 
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        if self.holds {
-            return RigStage::hold(self, drive, step);
+    fn advance(&mut self, mut drive: Drive, step: f64) -> Result<(), RigError> {
+        let mut late = 0.0;
+        if self.jitter > 0.0 {
+            late = self.jitter * normal(&mut self.random);
         }
-        let taken = self.taken(step);
+        // The end of the sample period is not where it should be.
+        let taken = step * (1.0 + late - self.late);
+        self.late = late;
+        self.elapsed += taken;
+        drive.is_held |= self.holds;
+        if let Some(converter) = self.output.filter(|_| drive.is_held) {
+            drive.displacement = converter.convert(drive.displacement);
+        }
         self.rig.advance(drive, taken)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let taken = self.taken(step);
-        let asked = drive.displacement;
-        let displacement = self.output.map_or(asked, |converter| converter.convert(asked));
-        self.rig.hold(Drive { displacement, ..drive }, taken)
     }
 }
 

@@ -208,36 +208,6 @@ impl Faulty {
             SensorFault::Late(hundredths) => ago(self.samples(hundredths)),
         }
     }
-
-    /// Drives the rig for one sample: `asked` is what is asked for.
-    fn drive(
-        &mut self,
-        asked: f64,
-        mut drive: Drive,
-        apply: impl Fn(&mut dyn Rig, Drive) -> Result<(), RigError>,
-    ) -> Result<(), RigError> {
-        let elapsed = self.elapsed();
-        self.taken += 1;
-        if asked != 0.0 {
-            self.driven = self.driven.max(self.taken);
-        }
-        if let Some(changed) = &mut self.changed {
-            apply(&mut **changed, drive)?;
-        }
-        match (self.fault, elapsed) {
-            (RigFault::Forward(hundredths), Some(0)) => {
-                for _ in 0..self.samples(hundredths) {
-                    apply(&mut *self.rig, drive)?;
-                }
-            }
-            (RigFault::Shaker(gain), Some(_)) => {
-                drive.amplitude *= gain;
-                drive.displacement *= gain;
-            }
-            _ => {}
-        }
-        apply(&mut *self.rig, drive)
-    }
 }
 
 impl Rig for Faulty {
@@ -267,12 +237,30 @@ impl Rig for Faulty {
         Ok(sensors)
     }
 
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.drive(drive.amplitude, drive, |rig, drive| rig.advance(drive, step))
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.drive(drive.displacement, drive, |rig, drive| rig.hold(drive, step))
+    fn advance(&mut self, mut drive: Drive, step: f64) -> Result<(), RigError> {
+        let elapsed = self.elapsed();
+        self.taken += 1;
+        let asked = if drive.is_held {
+            drive.displacement
+        } else {
+            drive.amplitude
+        };
+        if asked != 0.0 {
+            self.driven = self.driven.max(self.taken);
+        }
+        if let Some(changed) = &mut self.changed {
+            changed.advance(drive, step)?;
+        }
+        match (self.fault, elapsed) {
+            (RigFault::Forward(hundredths), Some(0)) => {
+                for _ in 0..self.samples(hundredths) {
+                    self.rig.advance(drive, step)?;
+                }
+            }
+            (RigFault::Shaker(gain), Some(_)) => drive = drive.map(|value| gain * value),
+            _ => {}
+        }
+        self.rig.advance(drive, step)
     }
 }
 

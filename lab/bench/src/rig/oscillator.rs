@@ -63,6 +63,14 @@ impl<P: Primary> Simulated<P> {
     }
 }
 
+/// A drive as a plant takes it.
+pub(super) fn of_plant(drive: Drive) -> lovines::Drive {
+    match drive.is_held {
+        true => lovines::Drive::held(drive.displacement),
+        false => lovines::Drive::harmonic(drive.amplitude, drive.omega),
+    }
+}
+
 impl<P: Primary> Rig for Simulated<P> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let response = match self.sensor {
@@ -73,11 +81,7 @@ impl<P: Primary> Rig for Simulated<P> {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.step(lovines::Drive::harmonic(drive.amplitude, drive.omega), step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.step(lovines::Drive::held(drive.displacement), step)
+        self.step(of_plant(drive), step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

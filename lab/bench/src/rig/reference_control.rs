@@ -180,6 +180,7 @@ impl ReferenceControl {
             omega: turn / step,
             amplitude,
             displacement: amplitude * of_rig.sin(),
+            is_held: false,
         }
     }
 }

@@ -60,11 +60,6 @@ impl<R: Rig> Measured<R> {
         self.compensated = mass.map(|mass| (mass, R::cell_displacement as Displacement<R>));
         self
     }
-
-    fn step_begins(&mut self, step: f64) {
-        self.before = [(self.now, step), self.before[0]];
-        self.cell = [self.cell[0], self.cell[0], self.cell[1]];
-    }
 }
 
 /// The derivative of three values, `late` and `early` seconds apart, at the middle one; exact for a sine of the frequency `omega`, rad/s.
@@ -134,13 +129,9 @@ impl<R: Rig> RigStage for Measured<R> {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.step_begins(step);
+        self.before = [(self.now, step), self.before[0]];
+        self.cell = [self.cell[0], self.cell[0], self.cell[1]];
         self.rig.advance(drive, step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.step_begins(step);
-        self.rig.hold(drive, step)
     }
 }
 
@@ -179,14 +170,6 @@ impl<'a, R: Rig + ?Sized> Scaled<'a, R> {
         let control = self.control.as_ref()?;
         Some(self.target.units.command.of_metres(control.amplitude()))
     }
-
-    fn command(&mut self, drive: Drive, step: f64) -> Result<Drive, RigError> {
-        let drive = match &mut self.control {
-            Some(control) => control.command(self.readings, drive, step)?,
-            None => drive,
-        };
-        Ok(self.target.command(drive))
-    }
 }
 
 impl<R: Rig + ?Sized> Rig for Scaled<'_, R> {
@@ -197,13 +180,11 @@ impl<R: Rig + ?Sized> Rig for Scaled<'_, R> {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let command = self.command(drive, step)?;
-        self.rig.advance(command, step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let command = self.command(drive, step)?;
-        self.rig.hold(command, step)
+        let drive = match &mut self.control {
+            Some(control) => control.command(self.readings, drive, step)?,
+            None => drive,
+        };
+        self.rig.advance(self.target.command(drive), step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -3,6 +3,7 @@
 use lovines::{Parameters, Plant, Refused, Row, State, StructureState};
 use vines_model::Sensor;
 
+use super::oscillator::of_plant;
 use super::{Clock, Drive, ForceCell, Rig, RigError, RigStage, Sensors, Simulated};
 use vines_scene::scene::{Excitation, Release, SceneShaker, Structure};
 
@@ -182,11 +183,7 @@ impl RigStage for SimulatedStructure {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.step(lovines::Drive::harmonic(drive.amplitude, drive.omega), step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let command = drive.amplitude.hypot(drive.displacement);
-        self.commanded(command, lovines::Drive::held(drive.displacement), step)
+        let of_plant = of_plant(drive);
+        self.commanded(drive.amplitude.hypot(of_plant.signal[0]), of_plant, step)
     }
 }

@@ -191,11 +191,8 @@ fn neither_a_loop_check_nor_a_held_sample_of_zero_cuts_the_stinger() {
         let sample = |n: u32| {
             let sine = (0.06 * f64::from(n)).sin() * f64::from(!n.is_multiple_of(10));
             let displacement = if holds { amplitude * sine } else { 0.0 };
-            let drive = Drive { omega, amplitude, displacement };
-            let driven = match holds {
-                true => rig.hold(drive, step),
-                false => rig.advance(drive, step),
-            };
+            let drive = Drive { omega, amplitude, displacement, is_held: holds };
+            let driven = rig.advance(drive, step);
             driven.and_then(|()| rig.sense()).unwrap().reference.unwrap().abs()
         };
         (0..200).map(sample).fold(0.0, f64::max)

@@ -72,7 +72,7 @@ fn noise_of(scene: &Scene) -> Vec<[f64; 2]> {
     let command = scene.units().command;
     let stretch = |share: f64| {
         let amplitude = command.of_metres(share * scene.amplitude);
-        let drive = Drive { omega, amplitude, displacement: 0.0 };
+        let drive = Drive { omega, amplitude, ..Drive::default() };
         let mut squares = [0.0; 2];
         for _ in 0..SAMPLES {
             let [one, other] = [&mut noisy, &mut clean].map(|rig| {
@@ -277,8 +277,8 @@ impl Rig for Counter {
         Ok(Sensors { response: self.0, reference: Some(-self.0) })
     }
 
-    fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
-        Ok(())
+    fn advance(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+        if drive.is_held { Err(RigError::NoHold) } else { Ok(()) }
     }
 }
 
@@ -744,7 +744,7 @@ impl Controller for Single {
         let input = single::Input { response: sensors.response as f32, reference, active };
         let output = self.0.process(&mut self.1, input);
         let [omega, amplitude, displacement] = [output.omega, output.amplitude, output.drive].map(f64::from);
-        let drive = Drive { omega, amplitude, displacement };
+        let drive = Drive { omega, amplitude, displacement, is_held: false };
         Ok(Command { drive, settled: Some(output.settled), ..Command::default() })
     }
 }

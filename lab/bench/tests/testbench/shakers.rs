@@ -474,7 +474,7 @@ fn excessive(scene: &Scene, amplitude: f64) -> Result<Record, ExperimentError> {
             true => 0.8,
             false => 0.0,
         };
-        let drive = vines_bench::rig::Drive { omega, amplitude: share * amplitude, displacement: 0.0 };
+        let drive = vines_bench::rig::Drive { omega, amplitude: share * amplitude, ..Default::default() };
         let settled = Some(samples > 2 * AT_LIMIT);
         *command = Command { drive, settled, ..Command::default() };
         Ok(())
@@ -605,7 +605,7 @@ fn an_amplifier_that_controls_the_current_needs_the_voltage_for_it() {
     let mut rig = Simulated::of(&scene).unwrap();
     let (omega, step) = (scene.dimensionless().omega0, scene.sample_time());
     let amplitude = scene.units().command.of_metres(10.0 * scene.amplitude);
-    let drive = vines_bench::rig::Drive { omega, amplitude, displacement: 0.0 };
+    let drive = vines_bench::rig::Drive { omega, amplitude, ..Default::default() };
     let error = (0..20_000).find_map(|_| rig.advance(drive, step).err());
     let is_limit = matches!(error, Some(RigError::ShakerLimit { name: "voltage", value, .. }) if value.abs() > 4.0);
     assert!(is_limit, "{error:?}");

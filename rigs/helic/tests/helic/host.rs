@@ -41,11 +41,8 @@ impl Rig for Base {
         Ok(Sensors { response: 1e-3, reference: Some(self.get()) })
     }
 
-    fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
-        unreachable!()
-    }
-
-    fn hold(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+    fn advance(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+        assert!(drive.is_held);
         *self.0.lock().unwrap() = drive.displacement;
         Ok(())
     }

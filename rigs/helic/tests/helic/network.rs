@@ -93,7 +93,7 @@ fn drive(rig: &mut HelicRig<Network>, samples: u32) -> Result<f64, RigError> {
         let base = rig.sense()?.reference.unwrap().abs();
         let omega = 55.0 + 1e-3 * f64::from(n);
         rig.advance(
-            Drive { omega, amplitude: 9e-5, displacement: 0.0 },
+            Drive { omega, amplitude: 9e-5, ..Drive::default() },
             scene().sample_time(),
         )?;
         Ok(largest.max(base))

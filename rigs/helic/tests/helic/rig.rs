@@ -63,7 +63,7 @@ fn connect(fate: Fate) -> HelicRig<Direct> {
 
 /// Drives the rig for some samples, and returns its readings.
 fn shake(rig: &mut HelicRig<Direct>, samples: usize) -> Result<Vec<Sensors>, RigError> {
-    let drive = Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 };
+    let drive = Drive { omega: 55.0, amplitude: 9e-5, ..Drive::default() };
     let mut sample = || {
         let sensors = rig.sense()?;
         rig.advance(drive, scene().sample_time())?;

@@ -73,7 +73,7 @@ impl Target {
 /// A drive that no mutation of another one gives.
 fn unique_drive(sent: &Sent, noise: &mut Noise) -> Drive {
     let unit = (noise.next() >> 11) as f64 / (1u64 << 53) as f64;
-    let drive = Drive { omega: 100.0 + unit, amplitude: 1e-4, displacement: 0.0 };
+    let drive = Drive { omega: 100.0 + unit, amplitude: 1e-4, ..Drive::default() };
     sent.lock().unwrap().insert(drive.omega.to_bits(), drive.amplitude);
     drive
 }

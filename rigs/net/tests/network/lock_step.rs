@@ -50,9 +50,12 @@ fn the_drive_of_a_client_that_has_left_ramps_to_zero() {
     let left = 20 + RAMP_SAMPLES as usize;
     assert_eq!((server.drives().len(), server.last().amplitude), (left, 0.0));
     // A base of held samples, too.
-    let (mut rig, base) = (server.rig(), Drive { displacement: 1e-3, ..Drive::default() });
+    let (mut rig, base) = (
+        server.rig(),
+        Drive { displacement: 1e-3, is_held: true, ..Drive::default() },
+    );
     rig.sense().unwrap();
-    rig.hold(base, SCENE.sample_time()).unwrap();
+    rig.advance(base, SCENE.sample_time()).unwrap();
     rig.sense().unwrap();
     drop(rig);
     server.session();

@@ -123,17 +123,12 @@ impl RigStage for Spy {
         self.1.lock().unwrap().push(drive);
         self.0.advance(drive, step)
     }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.1.lock().unwrap().push(drive);
-        self.0.hold(drive, step)
-    }
 }
 
 /// A drive whose frequency identifies its sample.
 fn drive(sample: usize) -> Drive {
     let omega = 50.0 + sample as f64 / 1024.0;
-    Drive { omega, amplitude: 1e-4, displacement: 0.0 }
+    Drive { omega, amplitude: 1e-4, ..Drive::default() }
 }
 
 /// Drives a rig in open loop for some samples of the default scene.
