@@ -205,7 +205,7 @@ struct SlidingFit {
 
 impl SlidingFit {
     fn point(&self, decay: &[Sample], knowledge: &Knowledge) -> FreeDecayPoint {
-        let Harmonic { amplitude, omega, rate, uncertainties, .. } = self.fit;
+        let Harmonic { amplitude, omega, rate, uncertainties } = self.fit;
         let d = &knowledge.numbers;
         let estimate = |value, uncertainty| Estimate { value, uncertainty };
         let measured = [
@@ -257,8 +257,6 @@ fn fitted(values: &[f64], [dt, periods]: [f64; 2], mut omega: f64, terms: Terms)
 pub struct Harmonic {
     /// Amplitude of the fundamental, in the unit of the samples.
     pub amplitude: f64,
-    /// Phase of the fundamental, rad: the samples are `amplitude sin(phase)` there.
-    pub phase: f64,
     /// Angular frequency, rad/s.
     pub omega: f64,
     /// Rate of change of the amplitude, 1/s times its unit.
@@ -271,11 +269,10 @@ impl Harmonic {
     /// The displacement of which a channel reads this harmonic.
     #[must_use]
     pub fn displacement(self, channel: usize, target: &Target) -> Self {
-        let (factor, lag) = target.displacement(channel, self.omega).to_polar();
+        let factor = target.displacement(channel, self.omega).norm();
         Self {
             amplitude: self.amplitude * factor,
             rate: self.rate * factor,
-            phase: self.phase + lag,
             uncertainties: [self.uncertainties[0] * factor, self.uncertainties[1]],
             ..self
         }
@@ -373,7 +370,6 @@ fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Op
     let largest = |degree: usize| variances(degree).fold(0.0, f64::max).sqrt();
     Some(Harmonic {
         amplitude,
-        phase: a.arg(),
         omega,
         rate: growth / amplitude,
         uncertainties: [
@@ -403,7 +399,6 @@ mod tests {
             let fit = harmonic(&values, dt, guess).unwrap();
             prop_assert!((fit.omega - 1.0).abs() < 1e-9, "{fit:?}");
             prop_assert!((fit.amplitude - amplitude).abs() < 1e-9);
-            prop_assert!((fit.phase - phase).abs() < 1e-9);
             // Silence has no harmonic.
             prop_assert_eq!(harmonic(&[0.0; 100], dt, guess), None);
         }
