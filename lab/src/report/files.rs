@@ -1,13 +1,10 @@
 //! The files of a run: tables, figures and JSON.
 
-use lovines::InvalidValue;
-use phase_lock::ConfigError;
 use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
 use super::figures::{backbone, history, manifold, regimes, tracked};
-use crate::cells::CellError;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::linear::MeasuredLinear;
 use crate::orbit::Periodic;
@@ -16,15 +13,9 @@ use crate::regime::Regime;
 use crate::regime_map::{Map, MapCell};
 use crate::scene::Scene;
 
-/// Why a report could not be computed, or the files of a run could not be written.
+/// Why the files of a run could not be written.
 #[derive(Debug, Error)]
 pub enum ReportError {
-    #[error(transparent)]
-    Plant(#[from] InvalidValue),
-    #[error(transparent)]
-    Controller(#[from] ConfigError),
-    #[error(transparent)]
-    Map(#[from] CellError),
     #[error("cannot write a table as CSV: {0}")]
     Csv(#[from] csv::Error),
     #[error("cannot write JSON: {0}")]
