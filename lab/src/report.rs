@@ -5,5 +5,5 @@ mod figures;
 mod files;
 mod theme;
 
-pub use figures::{CURVE_POINTS, fitted, responses, structure, theory};
+pub use figures::{fitted, responses, structure, theory};
 pub use files::{ReportError, identification_files, map_files, tracked_files};

@@ -11,8 +11,8 @@ use vines_model::orbit::{
 use crate::fit::{self, Contradiction, MeasuredPoint};
 use vines_scene::scene::{Scene, Structure, Units};
 
-/// Orbits on a curve.
-const CURVE_ORBITS: usize = 400;
+/// Points of a computed curve: at the size of a figure, neighbours are at most a few pixels apart.
+pub const CURVE_POINTS: usize = 400;
 /// Detunings of one oscillator's backbone.
 pub const DETUNINGS: [f64; 2] = [-6.0, 6.0];
 
@@ -47,14 +47,14 @@ pub struct BehindShaker {
 
 impl Survey {
     /// Number of orbits that are tried where the backbone is one curve.
-    pub const ORBITS: usize = 2 * CURVE_ORBITS;
+    pub const ORBITS: usize = 2 * CURVE_POINTS;
 
     /// The survey of a scene's structure; `None` without one. `progress` is called for every orbit of the backbone that is tried, about
     /// [`Self::ORBITS`] times.
     pub fn of(scene: &Scene, progress: &dyn Fn()) -> Option<Self> {
         let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
         let driven = section_of(structure);
-        let facts = orbits.facts(driven, scene.frequencies(), CURVE_ORBITS, progress)?;
+        let facts = orbits.facts(driven, scene.frequencies(), CURVE_POINTS, progress)?;
         let [low, high] = scene.frequencies();
         let [least, most] = SEARCHED.map(|share| share * scene.plant.natural_frequency());
         Some(Self {
@@ -128,7 +128,7 @@ fn backbone_of(scene: &Scene) -> Option<(&Structure, Vec<StructureBranch>)> {
     let orbits = scene.orbits_of(structure);
     // Other modes may have the motion that the loop finds.
     let range = orbits
-        .range(section_of(structure), CURVE_ORBITS)?
+        .range(section_of(structure), CURVE_POINTS)?
         .with(scene.frequencies());
     Some((structure, orbits.backbone(&range)))
 }
@@ -144,7 +144,7 @@ pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<
 /// The stable orbits of a scene's exact backbone, with those where its stable stretches begin and end.
 pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
     let Some((structure, branches)) = backbone_of(scene) else {
-        let stable = orbit::stable_backbone(numbers, DETUNINGS, CURVE_ORBITS);
+        let stable = orbit::stable_backbone(numbers, DETUNINGS, CURVE_POINTS);
         return stable.into_iter().flatten().collect();
     };
     let stable = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
@@ -197,7 +197,7 @@ pub fn structure_curves(
     is_response: bool,
 ) -> Option<Vec<OrbitCurve>> {
     let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
-    let range = StructureRange::at_any_speed(numbers, sigma, CURVE_ORBITS);
+    let range = StructureRange::at_any_speed(numbers, sigma, CURVE_POINTS);
     let branches = match is_response {
         true => orbits.frequency_response(scene.structure_drive()?, &range),
         false => orbits.backbone(&range),
@@ -212,7 +212,7 @@ pub fn structure_curves(
 /// Detunings of a structure's backbone and of the frequencies that the controller may set.
 pub fn detunings(scene: &Scene, numbers: &Dimensionless) -> Option<[f64; 2]> {
     let orbits = scene.structure_orbits()?;
-    let range = orbits.range(section_of(scene.structure.as_ref()?), CURVE_ORBITS)?;
+    let range = orbits.range(section_of(scene.structure.as_ref()?), CURVE_POINTS)?;
     Some(range.with(scene.frequencies()).omega.map(|omega| numbers.sigma(omega)))
 }
 

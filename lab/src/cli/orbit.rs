@@ -13,9 +13,9 @@ use vines::orbit::{
     Stability, backbone, continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion,
     stable_resonant,
 };
-use vines::report::{CURVE_POINTS, responses};
+use vines::report::responses;
 use vines::scene::{Dimensionless, Scene};
-use vines::survey::{DETUNINGS, detunings, structure_curves};
+use vines::survey::{CURVE_POINTS, DETUNINGS, detunings, structure_curves};
 use vines::table::{Table, lines, note, number};
 use vines::{ArgumentError, cells, numerics::range};
 

@@ -16,11 +16,9 @@ use crate::numerics::{Estimate, HarmonicBasis, equally_spaced, range};
 use crate::orbit::{StructureBranch, StructureOrbit};
 use crate::record::Record;
 use crate::scene::{Dimensionless, Scene, Sensor};
-use crate::survey::Survey;
+use crate::survey::{CURVE_POINTS, Survey};
 use crate::theory::{self, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, reading};
 
-/// Points of a computed curve: at this figure size, neighbours are at most a few pixels apart.
-pub const CURVE_POINTS: usize = 400;
 /// Only every fourth point along the decay is drawn, so that the circles do not overlap.
 const THINNED: usize = 4;
 
