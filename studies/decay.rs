@@ -75,7 +75,7 @@ impl RigStage for Watched {
             .filter(|n| is_fast(*n))
             .map(omega)
             .fold(f64::INFINITY, f64::min);
-        RigStage::sense(&mut self.rig)
+        self.rig.sense()
     }
 }
 

@@ -182,7 +182,7 @@ impl RigStage for Watched {
         let now = now(&self.structure, self.rig.plant());
         let is_beyond = |n: usize| limits[n].is_some_and(|limit| now[n] > limit * (1.0 + 1e-9));
         self.beyond.set(self.beyond.get() + usize::from((0..4).any(is_beyond)));
-        RigStage::sense(&mut self.rig)
+        self.rig.sense()
     }
 }
 

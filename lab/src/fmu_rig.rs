@@ -57,5 +57,6 @@ pub fn load(path: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
     if names.mapped("base").is_some() {
         differences.reference_quantity = Measurand::Displacement;
     }
-    Ok(Measured::new(rig, differences, &scene.plant).compensating(structure))
+    let compensated = structure.map_or(0.0, Structure::compensated_mass);
+    Ok(Measured::new(rig, differences, &scene.plant, compensated))
 }

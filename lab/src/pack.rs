@@ -264,7 +264,7 @@ fn system(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
         ),
         (
             "resources/controller.ssv".to_owned(),
-            parameter_set("controller", controller_values(&scene.controller_config())),
+            parameter_set("controller", controller_values(&scene.plan().lock)),
         ),
     ];
     let fmus = fmus

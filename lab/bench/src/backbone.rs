@@ -105,21 +105,11 @@ struct Tracker<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     end: Option<String>,
 }
 
-/// Tracks the backbone.
+/// Tracks the backbone, and leaves what was measured last in `samples` if it ends before the first point.
 ///
 /// # Errors
 /// A failure of the rig or of the controller, or no lock in the time allowed.
 pub fn track(
-    rig: &mut (impl Rig + ?Sized),
-    controller: &mut (impl Controller + ?Sized),
-    plan: &Plan,
-    progress: impl FnMut(usize, usize),
-) -> Result<Tracked, ExperimentError> {
-    track_into(&mut Vec::new(), rig, controller, plan, progress)
-}
-
-/// [`track`], which leaves what was measured last in `samples` if it ends before the first point.
-pub fn track_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),

@@ -150,18 +150,9 @@ pub enum ExperimentError {
     ResponseTooLarge { response: Quantity, limit: String },
 }
 
-/// Runs the whole experiment. `progress` receives the stage, the samples taken in it, and their largest number.
+/// Runs the whole experiment, which leaves what was measured in `samples` if it ends early. `progress` receives the stage, the samples taken in it, and
+/// their largest number.
 pub fn run(
-    rig: &mut (impl Rig + ?Sized),
-    controller: &mut (impl Controller + ?Sized),
-    plan: &Plan,
-    progress: impl FnMut(Stage, usize, usize),
-) -> Result<Record, ExperimentError> {
-    run_into(&mut Vec::new(), rig, controller, plan, progress)
-}
-
-/// [`run`], which leaves what was measured in `samples` if the experiment ends early.
-pub fn run_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
@@ -638,7 +629,7 @@ mod tests {
             (Fault::LockLost, "the phase error is 14.324 degrees"),
         ] {
             let target = scene.knowledge().target;
-            let text = evidence(&samples, &scene.controller_config(), &target, fault, None);
+            let text = evidence(&samples, &scene.plan().lock, &target, fault, None);
             assert!(text.contains(read) && text.contains(limit), "{text}");
         }
         // Under a force, 0.01 m of the driven mode's base are newtons, and its response is read at the sensor.
@@ -650,7 +641,7 @@ mod tests {
             target.units.response.of_metres(0.2),
         ]
         .map(short);
-        let text = evidence(&samples, &force.controller_config(), &target, Fault::Sensor, None);
+        let text = evidence(&samples, &force.plan().lock, &target, Fault::Sensor, None);
         assert!(
             text.contains(&format!("the response read {metres} m, and the force {newtons} N")),
             "{text}"

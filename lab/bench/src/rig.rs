@@ -18,7 +18,7 @@ pub use stages::{Interrupted, Measured, SensorsOnly, Stoppable};
 pub(crate) use structure::ShakerFault;
 pub use structure::SimulatedStructure;
 pub use vines_rig::{
-    Clock, Command, Controller, ControllerError, Drive, Fault, ForceCell, FrictionTotals, GroundTruth, LoopState, Move,
-    Rig, RigError, RigStage, Sensors,
+    Clock, Command, Controller, ControllerError, Drive, Fault, FrictionTotals, GroundTruth, LoopState, Move, Rig,
+    RigError, RigStage, Sensors,
 };
 pub use vines_scene::knowledge::has_friction;

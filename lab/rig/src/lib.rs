@@ -94,19 +94,15 @@ pub trait Rig {
     /// Errors of the implementation; [`RigError::NoHold`] of a rig that holds no samples.
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError>;
 
+    /// Displacement of the force cell, m, from which the acceleration of the mass before it follows; 0 of a rig without one.
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        Ok(0.0)
+    }
+
     /// The ground truth, if the rig is a simulation.
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         Ok(None)
     }
-}
-
-/// A rig that can tell where its force cell is.
-pub trait ForceCell {
-    /// Displacement of the force cell, m, from which the acceleration of the mass before it follows.
-    ///
-    /// # Errors
-    /// Errors of the implementation: a refused call.
-    fn cell_displacement(&mut self) -> Result<f64, RigError>;
 }
 
 /// A stage of the pipeline around a rig: it changes what is read or how the rig is driven, and passes everything else on.
@@ -137,6 +133,10 @@ impl<S: RigStage> Rig for S {
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         RigStage::advance(self, drive, step)
+    }
+
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        self.inner().cell_displacement()
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -3,7 +3,7 @@
 use clap::Args;
 use vines::comparison::{Doubt, TrackedComparison};
 use vines::survey::{contradiction, stable_backbone};
-use vines::{backbone::track_into, numerics::range, report, scene::Scene};
+use vines::{backbone::track, numerics::range, report, scene::Scene};
 
 use super::experiment::{ExperimentArguments, INTERRUPTED_FILE};
 use super::failure::Failure;
@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         experiment.start("vines backbone", Some(&arguments.rig), |plan| plan.tracking, &FILES)?;
     let bar = progress_bar(scene.backbone.points.into(), "tracking the backbone", "levels");
     let measured = session.measure(&scene, &plan, |samples, rig, controller| {
-        track_into(samples, rig, controller, &plan, |done, _| bar.set_position(done as u64))
+        track(samples, rig, controller, &plan, |done, _| bar.set_position(done as u64))
     });
     bar.finish_and_clear();
     let (tracked, ended) = measured?;

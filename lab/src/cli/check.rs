@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if let Some(controller) = &arguments.controller {
         let names = &scene.controller_names;
         variables += &controller.variables("controller", |file| FmuController::connections(file, names))?;
-        controller.controller(&scene.controller_config(), names, scope, open.pace)?;
+        controller.controller(&scene.plan().lock, names, scope, open.pace)?;
     }
     let checked = check(open.rig.as_mut(), &scene.plan()).map_err(ExperimentError::from)?;
     open.close();

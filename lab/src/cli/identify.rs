@@ -2,7 +2,7 @@
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::experiment::{Stage, run_into};
+use vines::experiment::{self, Stage};
 use vines::identification::{IdentificationError, Regime, identify};
 use vines::{advice, comparison::Comparison, pack::File, report, survey::contradiction};
 
@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         experiment.start("vines identify", arguments.rig.as_ref(), |plan| plan.lock, &FILES)?;
     let bar = progress_bar(Stage::Locking.samples(&plan) as u64, "", "samples");
     let measured = session.measure(&scene, &plan, |samples, rig, controller| {
-        run_into(samples, rig, controller, &plan, |stage, done, of| {
+        experiment::run(samples, rig, controller, &plan, |stage, done, of| {
             show(&bar, stage, done, of)
         })
     });

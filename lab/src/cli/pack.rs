@@ -47,7 +47,7 @@ const FILES: [&str; 4] = ["LoViNes.fmu", "PhaseLock.fmu", "bench.ssp", "Structur
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    BuiltIn::new(&scene.controller_config())?;
+    BuiltIn::new(&scene.plan().lock)?;
     let folder = results(&arguments.out, &FILES)?;
     let mut binaries = Vec::new();
     if !arguments.only_binaries {

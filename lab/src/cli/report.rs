@@ -124,7 +124,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if !is_structure {
         Map::new(arguments.scene.family()?, &arguments.x, &arguments.y, None, LIMIT)?;
     }
-    BuiltIn::new(&scene.controller_config())?;
+    BuiltIn::new(&scene.plan().lock)?;
     let folder = results(&arguments.out, &FILES)?;
     // The files of all commands are put in place together.
     let new = Temporary::new(tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?);

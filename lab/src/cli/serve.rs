@@ -237,7 +237,7 @@ pub(super) struct ControllerArguments {
 
 pub(super) fn controller(arguments: &ControllerArguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let controller = BuiltIn::new(&scene.controller_config())?;
+    let controller = BuiltIn::new(&scene.plan().lock)?;
     let (sample_time, silence) = (scene.sample_time(), arguments.silence);
     let service = Service { role: Role::Controller, sample_time, silence };
     let make = || Ok(Served::Controller(Box::new(controller.clone())));

@@ -343,7 +343,7 @@ fn host(scene: &Scene, structure: &Structure) -> Value {
 /// The settings of the page with the values of the scene, its curves, and what the module would know.
 fn table(title: &str, scene: &Scene) -> Value {
     let d = scene.dimensionless();
-    let lock = scene.controller_config().lock;
+    let lock = scene.plan().lock.lock;
     let ([plus, minus], cavity) = (scene.plant.gaps(), scene.plant.cavity);
     let mut table: Value = serde_json::from_str(include_str!("../../page/settings.json")).unwrap_or_default();
     table["watch"] = json!({

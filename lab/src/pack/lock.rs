@@ -66,10 +66,7 @@ fn rounded(value: f64) -> f64 {
 /// The files of plant and controller.
 pub(super) fn resources() -> [Vec<File>; 2] {
     let scene = Scene::parse("paper.toml", PAPER, &[]).expect("the default scene is correct");
-    let config = Config {
-        sample_time: 1.0 / f64::from(RATE),
-        ..scene.controller_config()
-    };
+    let config = Config { sample_time: 1.0 / f64::from(RATE), ..scene.plan().lock };
     let lock = config
         .build()
         .expect("the controller of the default scene allows this sample time");

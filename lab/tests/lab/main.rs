@@ -148,5 +148,5 @@ fn rig(scene: &Scene) -> Box<dyn Rig> {
 }
 
 fn built_in(scene: &Scene) -> BuiltIn {
-    BuiltIn::new(&scene.controller_config()).unwrap()
+    BuiltIn::new(&scene.plan().lock).unwrap()
 }

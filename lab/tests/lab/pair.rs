@@ -115,7 +115,7 @@ fn renamed(fmu: &str, to: &Path, names: &[(&str, &str)]) {
 
 /// Detuning at which a run has locked.
 fn locked(rig: &mut dyn Rig, controller: &mut dyn Controller, scene: &Scene) -> Result<f64, ExperimentError> {
-    let record = experiment::run(rig, controller, &scene.plan(), |_, _, _| {})?;
+    let record = experiment::run(&mut Vec::new(), rig, controller, &scene.plan(), |_, _, _| {})?;
     Ok(identify(&record, &scene.plan()).unwrap().lock.at.sigma)
 }
 
@@ -138,7 +138,7 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
     let names = [("response", "input"), ("phase_error", "error"), ("settled", "done")];
     renamed(&controller, &loop_file, &names);
     let own_loop = |scene: &Scene| {
-        let config = scene.controller_config();
+        let config = scene.plan().lock;
         FmuController::load(&loop_file, &config, &scene.controller_names).unwrap()
     };
 

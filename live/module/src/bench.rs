@@ -65,7 +65,7 @@ impl Bench {
     pub fn new(settings: Settings) -> Result<Self, Message> {
         let scene = changed(default_scene(), &settings);
         let plant = Plant::new(scene.plant, scene.start)?;
-        let controller = BuiltIn::new(&scene.controller_config())?;
+        let controller = BuiltIn::new(&scene.plan().lock)?;
         Ok(Self {
             samples: 0,
             active: true,
@@ -100,7 +100,7 @@ impl Bench {
             return Ok(());
         }
         let scene = changed(default_scene(), &settings);
-        let lock = scene.controller_config().build()?;
+        let lock = scene.plan().lock.build()?;
         self.rig.plant.set_parameters(scene.plant)?;
         self.rig.noise = settings[index::NOISE] * 0.01 * scene.plant.half_width;
         self.tracking = None;
@@ -121,7 +121,7 @@ impl Bench {
     /// # Errors
     /// The message of a lab's error, such as no lock; then the bench runs on as before.
     pub fn track(&mut self) -> Result<(), Message> {
-        let lock = self.scene.backbone_config().build()?;
+        let lock = self.scene.plan().tracking.build()?;
         let controller = BuiltIn { lock, ..self.controller.clone() };
         self.tracking = Some(track(&self.scene, &self.rig, controller.clone(), self.samples)?);
         self.controller = controller;

@@ -77,9 +77,13 @@ pub fn track(scene: &Scene, rig: &NoisyRig, controller: BuiltIn, sample: u64) ->
     let last = Cell::new((sample, 0.0));
     let mut controller = Ahead { controller, last: &last, moves: Vec::new() };
     let mut begun = Vec::new();
-    let tracked = backbone::track(&mut rig.clone(), &mut controller, &scene.plan(), |_, _| {
-        begun.push(last.get())
-    })?;
+    let tracked = backbone::track(
+        &mut Vec::new(),
+        &mut rig.clone(),
+        &mut controller,
+        &scene.plan(),
+        |_, _| begun.push(last.get()),
+    )?;
     let ends = begun.into_iter().skip(1).chain([last.get()]);
     let points = tracked.points.iter().zip(ends);
     let points = points.map(|(point, (sample, omega))| BackbonePoint {

@@ -27,8 +27,8 @@ impl Controller for ConstantDrive {
 /// The record of the lab's experiment under a constant drive.
 fn record_of(scene: &Scene) -> Record {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
-    run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap()
+    let mut controller = ConstantDrive(BuiltIn::new(&scene.plan().lock).unwrap());
+    run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap()
 }
 
 fn bench() -> Bench {

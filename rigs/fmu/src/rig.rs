@@ -6,8 +6,7 @@ use std::path::Path;
 use lovines::table::PARAMETERS as PLANT_PARAMETERS;
 use phase_lock::Value;
 use vines_rig::{
-    Definition, Drive, ForceCell, FrictionTotals, GroundTruth, Names, Reference as ReferenceSignal, Rig, RigError,
-    Sensors,
+    Definition, Drive, FrictionTotals, GroundTruth, Names, Reference as ReferenceSignal, Rig, RigError, Sensors,
 };
 
 use crate::instance::{Connection, Fmu, FmuError, Use, Variable, connections};
@@ -175,12 +174,6 @@ impl Inside {
     }
 }
 
-impl ForceCell for FmuRig {
-    fn cell_displacement(&mut self) -> Result<f64, RigError> {
-        Ok(self.fmu.get_if(self.cell)?.unwrap_or(0.0))
-    }
-}
-
 impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         Ok(Sensors {
@@ -206,6 +199,10 @@ impl Rig for FmuRig {
             self.fmu.set(of_amplitude, 0.0)?;
         }
         Ok(self.fmu.step(step)?)
+    }
+
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        Ok(self.fmu.get_if(self.cell)?.unwrap_or(0.0))
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -41,7 +41,12 @@ impl Simulated {
             Some(structure) => {
                 let mut rig = SimulatedStructure::new(structure, scene.plant, scene.start)?;
                 rig.fault = fault;
-                Box::new(Measured::new(rig, scene.resonance, &scene.plant).compensating(Some(structure)))
+                Box::new(Measured::new(
+                    rig,
+                    scene.resonance,
+                    &scene.plant,
+                    structure.compensated_mass(),
+                ))
             }
         })
     }
@@ -50,7 +55,7 @@ impl Simulated {
     pub fn with_sensors(mut self, definition: Definition) -> Measured<Self> {
         self.sensor = definition.sensor;
         let parameters = *self.plant.parameters();
-        Measured::new(self, definition, &parameters)
+        Measured::new(self, definition, &parameters, 0.0)
     }
 }
 

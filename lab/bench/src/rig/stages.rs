@@ -8,12 +8,8 @@ use thiserror::Error;
 use vines_model::{Definition, Measurand, Reference};
 
 use super::reference_control::ReferenceControl;
-use super::{Drive, ForceCell, GroundTruth, Rig, RigError, RigStage, Sensors};
+use super::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
 use vines_scene::knowledge::{Knowledge, Target};
-use vines_scene::scene::Structure;
-
-/// [`ForceCell::cell_displacement`].
-type Displacement<R> = fn(&mut R) -> Result<f64, RigError>;
 
 /// A rig whose response and reference are displacements, with the sensors of a definition of resonance.
 ///
@@ -30,35 +26,25 @@ pub struct Measured<R> {
     now: Sensors,
     /// The readings before, the latest first, each with the time to the next one, s.
     before: [(Sensors, f64); 2],
-    /// Mass that is compensated behind a force cell, kg, and the displacement of the cell, m.
-    compensated: Option<(f64, Displacement<R>)>,
+    /// Mass that is compensated behind a force cell, kg; 0 without one.
+    compensated: f64,
     /// Displacements of the cell, m: now and before.
     cell: [f64; 3],
 }
 
 impl<R: Rig> Measured<R> {
-    /// The rig `rig` with the parameters `plant` and the sensors of `definition`.
-    pub fn new(rig: R, definition: Definition, plant: &Parameters) -> Self {
+    /// The rig `rig` with the parameters `plant` and the sensors of `definition`. Its force cell reads less than the force by the mass `compensated`, kg,
+    /// times the acceleration there.
+    pub fn new(rig: R, definition: Definition, plant: &Parameters, compensated: f64) -> Self {
         Self {
             rig,
             definition,
             plant: [plant.damping / plant.stiffness, plant.natural_frequency()],
             now: Sensors::default(),
             before: [(Sensors::default(), 0.0); 2],
-            compensated: None,
+            compensated,
             cell: [0.0; 3],
         }
-    }
-
-    /// This rig with the mass compensation of a structure's force cell: less its mass times the acceleration there.
-    #[must_use]
-    pub fn compensating(mut self, structure: Option<&Structure>) -> Self
-    where
-        R: ForceCell,
-    {
-        let mass = structure.map(Structure::compensated_mass).filter(|mass| *mass > 0.0);
-        self.compensated = mass.map(|mass| (mass, R::cell_displacement as Displacement<R>));
-        self
     }
 }
 
@@ -83,10 +69,10 @@ impl<R: Rig> RigStage for Measured<R> {
 
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.now = self.rig.sense()?;
-        if let Some((_, displacement)) = self.compensated {
-            self.cell[0] = displacement(&mut self.rig)?;
+        if self.compensated > 0.0 {
+            self.cell[0] = self.rig.cell_displacement()?;
         }
-        if !(self.definition.is_late() || self.compensated.is_some()) {
+        if !(self.definition.is_late() || self.compensated > 0.0) {
             return Ok(self.now);
         }
         let [(middle, late), (first, early)] = self.before;
@@ -116,11 +102,9 @@ impl<R: Rig> RigStage for Measured<R> {
         };
         let base = first.reference.zip(middle.reference).zip(self.now.reference);
         let without_inertia = |force: f64| {
-            self.compensated.map_or(force, |(mass, _)| {
-                let [now, middle, first] = self.cell;
-                let acceleration = derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0);
-                mass.mul_add(-acceleration, force)
-            })
+            let [now, middle, first] = self.cell;
+            let acceleration = derivative(Measurand::Acceleration, [first, middle, now], [early, late], omega0);
+            self.compensated.mul_add(-acceleration, force)
         };
         Ok(Sensors {
             response: read(0, [first.response, middle.response, self.now.response]),

@@ -4,7 +4,7 @@ use lovines::{Parameters, Plant, Refused, Row, State, StructureState};
 use vines_model::Sensor;
 
 use super::oscillator::of_plant;
-use super::{Clock, Drive, ForceCell, Rig, RigError, RigStage, Sensors, Simulated};
+use super::{Clock, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
 use vines_scene::scene::{Excitation, Release, SceneShaker, Structure};
 
 /// A simulated structure. It is driven with the displacement of its base, m, a force, N, or the command of its shaker, V. It reads the displacement at
@@ -165,18 +165,7 @@ impl SimulatedStructure {
     }
 }
 
-impl ForceCell for SimulatedStructure {
-    fn cell_displacement(&mut self) -> Result<f64, RigError> {
-        let shaker = self.structure.shaker.as_ref();
-        Ok(shaker.map_or(0.0, |shaker| self.simulated.plant.point(&shaker.rows.end)[0]))
-    }
-}
-
-impl RigStage for SimulatedStructure {
-    fn inner(&mut self) -> &mut dyn Rig {
-        &mut self.simulated
-    }
-
+impl Rig for SimulatedStructure {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let [response, ..] = self.simulated.plant.point(&self.sensor);
         Ok(Sensors { response, reference: Some(self.reference()) })
@@ -185,5 +174,14 @@ impl RigStage for SimulatedStructure {
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let of_plant = of_plant(drive);
         self.commanded(drive.amplitude.hypot(of_plant.signal[0]), of_plant, step)
+    }
+
+    fn cell_displacement(&mut self) -> Result<f64, RigError> {
+        let shaker = self.structure.shaker.as_ref();
+        Ok(shaker.map_or(0.0, |shaker| self.simulated.plant.point(&shaker.rows.end)[0]))
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.simulated.ground_truth()
     }
 }

@@ -24,7 +24,7 @@ fn a_controller_that_does_not_release_the_drive_is_an_error_and_the_bench_switch
     let scene = scene(&[]);
     let amplitude = scene.amplitude;
     let refused = |change: &dyn Fn(&mut Command, usize), words: &str| {
-        let (record, last, _) = foreign(&scene, &scene.controller_config(), |command, (active, asked)| {
+        let (record, last, _) = foreign(&scene, &scene.plan().lock, |command, (active, asked)| {
             if !active {
                 change(command, asked);
             }
@@ -59,7 +59,7 @@ fn a_controller_that_does_not_release_the_drive_is_an_error_and_the_bench_switch
 fn a_decay_begins_at_the_end_of_the_ramp() {
     let scene = scene(&["record.decay_periods=60"]);
     let ramp = scene.plan().knowledge.samples(4.0);
-    let (record, ..) = foreign(&scene, &scene.controller_config(), |command, (active, asked)| {
+    let (record, ..) = foreign(&scene, &scene.plan().lock, |command, (active, asked)| {
         if !active {
             command.drive.amplitude = scene.amplitude * (1.0 - (asked + 1) as f64 / ramp as f64).max(0.0);
         }
@@ -141,7 +141,7 @@ fn a_lock_is_at_the_requested_drive_and_its_decay_begins_where_the_base_rests_al
 fn another_phase_or_drive_than_asked_is_said_before_anything_else_is_blamed() {
     let scene = scene(&["phase_lock.acquire_timeout=60"]);
     let said = |turned: f64, times: f64, settled: Option<bool>| {
-        let config = scene.controller_config();
+        let config = scene.plan().lock;
         let config = Config {
             phase_target: config.phase_target + turned * PI / 180.0,
             amplitude: times * config.amplitude,

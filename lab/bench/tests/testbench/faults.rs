@@ -38,7 +38,7 @@ fn inject(settings: &[&str], instants: usize, limit: f64) {
     let [settled, released] = [record.settled, record.released].map(|sample| sample as f64 * step);
     let tracked = tracked_of(&scene);
     let tracking = (tracked.periods_to_lock + 40.0) * period;
-    let config = scene.controller_config();
+    let config = scene.plan().lock;
     let ramp = config
         .ramp_rate
         .map_or(0.0, |rate| config.amplitude_max.unwrap_or(config.amplitude) / rate);
@@ -134,8 +134,8 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
         };
         let mut rig = Altered { read: Box::new(read), ..Altered::driven(&scene, drive) };
         let answer = |command: &mut Command, (_, sample): Asked| if sample < 2000 { Ok(()) } else { breaks(command) };
-        let mut controller = Foreign::new(&scene.controller_config(), answer);
-        let run = || experiment::run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+        let mut controller = Foreign::new(&scene.plan().lock, answer);
+        let run = || experiment::run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _, _| {});
         let ended = catch_unwind(AssertUnwindSafe(run));
         assert_eq!(last.get(), 0.0);
         ended
@@ -162,7 +162,7 @@ fn unlimited(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, 
         amplitude_max: None,
         response_max: None,
         residual_max: None,
-        ..scene.controller_config()
+        ..scene.plan().lock
     };
     let (record, _, largest) = foreign(scene, &limits, |command, (_, sample)| change(command, sample));
     (record, largest)
@@ -171,7 +171,7 @@ fn unlimited(scene: &Scene, change: fn(&mut Command, usize)) -> (Result<Record, 
 #[test]
 fn the_limits_of_the_scene_guard_the_rig_whatever_controls_it() {
     let scene = scene(&[]);
-    let limit = scene.controller_config().amplitude_max.unwrap();
+    let limit = scene.plan().lock.amplitude_max.unwrap();
     let refused = |scene: &Scene, change, words: &str| {
         let (record, largest) = unlimited(scene, change);
         let message = record.unwrap_err().to_string();

@@ -16,14 +16,14 @@ use super::{Foreign, dimensionless, paper, record_of};
 /// How an experiment ends early, and its samples.
 fn ended(scene: &Scene) -> (ExperimentError, Vec<Sample>) {
     let (mut rig, mut samples) = (Simulated::of(scene).unwrap(), Vec::new());
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    let record = experiment::run_into(&mut samples, &mut *rig, &mut controller, &scene.plan(), |_, _, _| {});
+    let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
+    let record = experiment::run(&mut samples, &mut *rig, &mut controller, &scene.plan(), |_, _, _| {});
     (record.unwrap_err(), samples)
 }
 
 /// A controller that cannot control the response: it holds the drive.
 fn constant_drive(scene: &Scene) -> impl Controller {
-    Foreign::new(&scene.controller_config(), |_: &mut _, _| Ok(()))
+    Foreign::new(&scene.plan().lock, |_: &mut _, _| Ok(()))
 }
 
 /// What is identified on a rig.
@@ -33,7 +33,7 @@ fn identified_by(
     scene: &Scene,
     plan: &Plan,
 ) -> Result<Comparison, IdentificationError> {
-    let record = experiment::run(rig, controller, plan, |_, _, _| {}).unwrap();
+    let record = experiment::run(&mut Vec::new(), rig, controller, plan, |_, _, _| {}).unwrap();
     Ok(Comparison::of(&identify(&record, plan)?, scene))
 }
 
@@ -100,7 +100,7 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
     let scene = dimensionless("");
     let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
     assert_eq!(rig.ground_truth().unwrap(), None);
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
     let mute = identified_by(&mut rig, &mut controller, &scene, &scene.plan()).unwrap();
     let telling = identified("");
     assert_eq!(mute.lock.regime, Regime::Symmetric);

@@ -154,15 +154,15 @@ fn foreign(
         change(command, asked);
         Ok(())
     });
-    let record = run(&mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+    let record = run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _, _| {});
     drop(rig);
     (record, last, largest)
 }
 
 /// The record of an experiment.
 fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    run(rig, &mut controller, &scene.plan(), |_, _, _| {})
+    let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
+    run(&mut Vec::new(), rig, &mut controller, &scene.plan(), |_, _, _| {})
 }
 
 /// The record of the rig of a scene.
@@ -177,8 +177,8 @@ fn identified(scene: &Scene) -> Result<Identification, IdentificationError> {
 
 /// The tracked backbone.
 fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Result<Tracked, ExperimentError> {
-    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
-    track(rig, &mut controller, &checked(scene), |_, _| {})
+    let mut controller = BuiltIn::new(&scene.plan().tracking).unwrap();
+    track(&mut Vec::new(), rig, &mut controller, &checked(scene), |_, _| {})
 }
 
 /// The tracked backbone of the rig of a scene.

@@ -682,7 +682,7 @@ const LOCK_TIME_SETTINGS: [&str; 5] = [
 
 /// Periods until a loop settles, if that ends the run, at most 800.
 fn periods_to_settle(rig: &mut Simulated, scene: &Scene, ends: bool) -> f64 {
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
     let (step, mut periods) = (scene.sample_time(), 0.0);
     while periods < 800.0 {
         let command = controller.sample(rig.sense().unwrap(), true).unwrap();
@@ -780,7 +780,7 @@ fn single_precision_keeps_the_lock_within_1e_4_in_sigma() {
         ("plant.r=0.8", 2000.0),
     ] {
         let scene = spaced(settings);
-        let config = scene.controller_config();
+        let config = scene.plan().lock;
         let (expected, locks) = detuning(&scene, settle, &mut BuiltIn::new(&config).unwrap());
         let controller = rounded(&config).build().unwrap();
         let state = controller.start();

@@ -196,27 +196,27 @@ fn names_have_units_or_factors_and_mistakes_are_named() {
 #[test]
 fn limits_follow_from_the_numbers_of_the_rig() {
     let scene = paper(&[]);
-    let (config, d) = (scene.controller_config(), scene.dimensionless());
+    let (config, d) = (scene.plan().lock, scene.dimensionless());
     assert!((d.excitation(config.amplitude_max.unwrap()) - 4.0 * 1.1 * d.lambda).abs() < 1e-9);
     assert_eq!(config.response_max, Some(4.0 * d.b));
     assert!(config.acquire_timeout.is_some() && config.signal_timeout.is_some());
-    let tracking = scene.backbone_config().amplitude_max.unwrap();
+    let tracking = scene.plan().tracking.amplitude_max.unwrap();
     assert!((tracking - d.amplitude(4.0)).abs() < 1e-18);
     // Below and above what a tracked backbone may use without a limit.
     for limit in [2e-4, 5e-4] {
         let limited = paper(&[&format!("phase_lock.amplitude_max={limit}")]);
-        let both = [limited.controller_config(), limited.backbone_config()];
+        let both = [limited.plan().lock, limited.plan().tracking];
         assert_eq!(both.map(|config| config.amplitude_max), [Some(limit); 2]);
     }
 }
 
 fn config(setting: &str) -> Result<Config, SceneError> {
-    Ok(Scene::load(None, &set(&[setting]))?.controller_config())
+    Ok(Scene::load(None, &set(&[setting]))?.plan().lock)
 }
 
 #[test]
 fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
-    let before = paper(&[]).controller_config();
+    let before = paper(&[]).plan().lock;
     for parameter in &PARAMETERS {
         let name = parameter.name;
         let key = KEYS.iter().find(|(parameter, ..)| *parameter == name);
@@ -246,7 +246,7 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
         "phase_lock.lock.coherence_min=0.25",
         "phase_lock.lock.response_min=0.125",
     ];
-    let lock = paper(&group).controller_config().lock;
+    let lock = paper(&group).plan().lock.lock;
     assert_eq!((lock.coherence_min, lock.response_min), (0.25, 0.125));
 }
 

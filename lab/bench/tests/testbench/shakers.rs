@@ -340,7 +340,7 @@ fn distance_of_checked_lock(chain: &str) -> [f64; 2] {
     let linear = check(&mut rig, &scene.plan()).unwrap().linear.unwrap();
     let plan = scene.plan_on(scene.knowledge().measured(linear.response));
     let mut controller = BuiltIn::new(&plan.lock).unwrap();
-    let record = run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
+    let record = run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
     let compared = Comparison::of(&identify(&record, &plan).unwrap(), &scene);
     let (at, exact) = (compared.lock.at, compared.exact.unwrap());
     assert!(compared.lock.at_requested_drive, "{at:?}");
@@ -367,7 +367,13 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
     let plan = scene.plan();
     let mut controller = BuiltIn::new(&plan.tracking).unwrap();
     let rig = Simulated::of(&scene).unwrap();
-    let error = track(&mut SensorsOnly::around(rig), &mut controller, &plan, |_, _| {});
+    let error = track(
+        &mut Vec::new(),
+        &mut SensorsOnly::around(rig),
+        &mut controller,
+        &plan,
+        |_, _| {},
+    );
     let is_limit = |error: &ExperimentError| {
         matches!(error, ExperimentError::Rig(RigError::ShakerLimit { name: "force", .. }))
             && error.to_string().contains("shaker.force_max")
@@ -422,7 +428,7 @@ impl RigStage for Extremes {
         let before = self.largest.get();
         // Falls to 1 % in 900 samples, so that the search is forgotten.
         self.largest.set([0, 1, 2].map(|n| now[n].max(0.995 * before[n])));
-        RigStage::sense(&mut self.rig)
+        self.rig.sense()
     }
 }
 
@@ -443,8 +449,8 @@ fn the_bench_plans_within_the_limits_of_a_shaker() {
         let rig = Extremes { rig, structure, largest: Rc::clone(&largest) };
         let plan = Plan { decay: 0, ..scene.plan() };
         let mut controller = BuiltIn::new(&plan.lock).unwrap();
-        let mut rig = Measured::new(rig, scene.resonance, &scene.plant);
-        run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
+        let mut rig = Measured::new(rig, scene.resonance, &scene.plant, 0.0);
+        run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
         for ((name, key), needed) in LIMITED.into_iter().zip(largest.get()) {
             for times in [1.6, 1.9, 2.2] {
                 let limited = text.replace("[shaker]", &format!("[shaker]\n{key} = {:?}", times * needed));
@@ -481,7 +487,7 @@ fn excessive(scene: &Scene, amplitude: f64) -> Result<Record, ExperimentError> {
     };
     let mut controller = Foreign::new(&plan.lock, answer);
     let mut rig = Simulated::of(scene).unwrap();
-    run(&mut *rig, &mut controller, &plan, |_, _, _| {})
+    run(&mut Vec::new(), &mut *rig, &mut controller, &plan, |_, _, _| {})
 }
 
 #[test]

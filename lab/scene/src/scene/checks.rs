@@ -123,7 +123,10 @@ fn as_sampled(scene: &Scene) -> Range {
 
 fn samples_of_record(scene: &Scene) -> f64 {
     let periods = scene.record.hold_periods + scene.record.decay_periods.unwrap_or(0.0);
-    let longest = scene.controller_config().acquire_timeout.unwrap_or(f64::INFINITY);
+    let longest = scene
+        .lock_config(&scene.knowledge())
+        .acquire_timeout
+        .unwrap_or(f64::INFINITY);
     (longest / scene.sample_time()).round() + scene.controller.samples_per_period * periods
 }
 

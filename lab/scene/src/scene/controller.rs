@@ -92,16 +92,6 @@ impl Scene {
             .collect()
     }
 
-    /// Configuration of the controller on a rig of which no more is known than the scene says.
-    pub fn controller_config(&self) -> Config {
-        self.lock_config(&self.knowledge())
-    }
-
-    /// Configuration of the controller that tracks the backbone of such a rig.
-    pub fn backbone_config(&self) -> Config {
-        self.tracking_config(&self.knowledge())
-    }
-
     /// Configuration of the controller for the scene's excitation.
     pub(crate) fn lock_config(&self, knowledge: &Knowledge) -> Config {
         let LinearResponse { omega0, damping_rate, .. } = knowledge.linear;
@@ -160,7 +150,7 @@ impl Scene {
     /// # Errors
     /// The value that is refused, in the units of the scene.
     pub(crate) fn check_controller(&self) -> Result<(), SceneError> {
-        let config = self.controller_config();
+        let config = self.lock_config(&self.knowledge());
         let Err(error) = config.build() else { return Ok(()) };
         let unit = self.units().reference;
         // Five digits: the value has been multiplied and divided.

@@ -28,10 +28,10 @@ fn an_experiment_with_held_samples_across_the_network_gives_the_same_bits() {
     scene.record.decay_periods = Some(150.0);
     let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
         let mut rig = Chain::around(rig, &scene);
-        experiment::run(rig.as_mut(), controller, &scene.plan(), |_, _, _| {}).unwrap()
+        experiment::run(&mut Vec::new(), rig.as_mut(), controller, &scene.plan(), |_, _, _| {}).unwrap()
     };
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.controller_config()).unwrap());
+    let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.plan().lock).unwrap());
     let (rig, peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
     let client = rig.rig();
     assert_eq!(client.pace(), None);
@@ -106,7 +106,7 @@ fn a_missing_server_is_reported_with_its_address_and_what_should_be_there() {
     let silent = socket();
     let place = silent.local_addr().unwrap();
     let rig = |address| NetRig::connect(address, 1e-3, None).unwrap_err();
-    let controller = NetController::connect(place, &SCENE.controller_config(), None, None).unwrap_err();
+    let controller = NetController::connect(place, &SCENE.plan().lock, None, None).unwrap_err();
     for (error, expected) in [
         (rig(Address::Udp(place)), (Address::Udp(place), false)),
         (rig(Address::Tcp(place)), (Address::Tcp(place), false)),
@@ -160,7 +160,7 @@ fn refused(error: &LinkError) -> Refusal {
 fn another_role_another_sample_time_and_other_sensors_are_refused() {
     let scene = scene(&["resonance.sensor='q1'"]);
     let (rig, peer) = (serve_rig(Address::Tcp, &scene, 5.0), serve_built_in(&scene));
-    let (step, config) = (scene.sample_time(), scene.controller_config());
+    let (step, config) = (scene.sample_time(), scene.plan().lock);
     let connect = |address, step| NetRig::connect(address, step, None).unwrap_err();
     let controller = NetController::connect(rig.address.socket(), &config, None, None).unwrap_err();
     let role = "it is a rig where a controller is needed, or the reverse";
@@ -295,7 +295,7 @@ fn an_error_of_a_served_rig_or_controller_reaches_the_client_with_its_name_and_n
     assert!(error.contains("no calibration of channel 3"), "{error}");
     let service = Service { role: Role::Controller, ..service(&SCENE, 5.0) };
     let (at, _) = serve_once(Address::Tcp, service, None, || Ok(Offered::Controller(Box::new(Hot))));
-    let mut hot = NetController::connect(at.socket(), &SCENE.controller_config(), None, None).unwrap();
+    let mut hot = NetController::connect(at.socket(), &SCENE.plan().lock, None, None).unwrap();
     let error = hot.sample(Sensors::default(), true).unwrap_err().to_string();
     assert!(error.contains("too hot, 92 degrees"), "{error}");
 }

@@ -53,7 +53,7 @@ impl Served {
 
     /// A client of the controller, beside a rig of this `pace`.
     fn controller(&self, pace: Option<f64>) -> NetController {
-        NetController::connect(self.address.socket(), &self.scene.controller_config(), pace, None).unwrap()
+        NetController::connect(self.address.socket(), &self.scene.plan().lock, pace, None).unwrap()
     }
 
     fn drives(&self) -> Vec<Drive> {
@@ -98,7 +98,7 @@ fn serve_controller(scene: &Scene, silence: f64, controller: impl Controller + C
 
 /// Serves the controller of the scene.
 fn serve_built_in(scene: &Scene) -> Served {
-    serve_controller(scene, 5.0, BuiltIn::new(&scene.controller_config()).unwrap())
+    serve_controller(scene, 5.0, BuiltIn::new(&scene.plan().lock).unwrap())
 }
 
 /// A controller that answers with a function of the response.
