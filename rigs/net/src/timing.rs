@@ -14,8 +14,6 @@ use crate::frame::{Frame, Kind};
 const LARGEST_LATENESS: u64 = 60_000_000_000;
 /// Significant digits of a lateness in the histogram.
 const DIGITS: u8 = 3;
-/// s per ns.
-const NANO: f64 = 1e-9;
 
 /// The clock of a rig in real time, and the lateness of its samples.
 #[derive(Debug, Clone)]
@@ -27,8 +25,8 @@ pub struct RealTimeClock {
     lateness: Histogram<u64>,
     /// Number of samples that were late by a whole period or more.
     missed: u64,
-    /// Largest lateness, s.
-    worst: f64,
+    /// Largest lateness.
+    worst: Duration,
     /// Time from the start to the last sample.
     served: Duration,
 }
@@ -42,7 +40,7 @@ impl RealTimeClock {
             period,
             lateness,
             missed: 0,
-            worst: 0.0,
+            worst: Duration::ZERO,
             served: Duration::ZERO,
         }
     }
@@ -55,7 +53,7 @@ impl RealTimeClock {
     /// Counts sample `n`, which is served now.
     pub fn serve(&mut self, n: u64) {
         self.served = self.start.elapsed();
-        self.record(self.served.as_secs_f64() - n as f64 * self.period);
+        self.record(self.served.saturating_sub(self.due(n) - self.start));
     }
 
     /// Time from the start to the last sample, s.
@@ -63,20 +61,21 @@ impl RealTimeClock {
         self.served.as_secs_f64()
     }
 
-    fn record(&mut self, lateness: f64) {
-        self.lateness.saturating_record((lateness / NANO) as u64);
-        self.missed += u64::from(lateness >= self.period);
+    fn record(&mut self, lateness: Duration) {
+        self.lateness.saturating_record(lateness.as_nanos() as u64);
+        self.missed += u64::from(lateness.as_secs_f64() >= self.period);
         self.worst = self.worst.max(lateness);
     }
 
     /// The figures of all samples since the start or [`RealTimeClock::forget`]; of them, `held` had no drive in time.
     pub fn timing(&self, held: u64) -> Timing {
         // The upper limit of a class may be above the largest value in it.
-        let quantile = |share| (self.lateness.value_at_quantile(share) as f64 * NANO).min(self.worst);
+        let quantile = |share| self.lateness.value_at_quantile(share);
+        let quantile = |share| Duration::from_nanos(quantile(share)).min(self.worst).as_secs_f64();
         Timing {
             samples: self.lateness.len(),
             missed: self.missed,
-            worst: self.worst,
+            worst: self.worst.as_secs_f64(),
             held,
             p99: quantile(0.99),
             p99_99: quantile(0.9999),
@@ -87,14 +86,19 @@ impl RealTimeClock {
     pub fn classes(&self) -> Vec<(f64, u64)> {
         let classes = self.lateness.iter_recorded();
         classes
-            .map(|class| (class.value_iterated_to() as f64 * NANO, class.count_at_value()))
+            .map(|class| {
+                (
+                    Duration::from_nanos(class.value_iterated_to()).as_secs_f64(),
+                    class.count_at_value(),
+                )
+            })
             .collect()
     }
 
     /// Forgets the lateness of the samples until now.
     pub fn forget(&mut self) {
         self.lateness.reset();
-        (self.missed, self.worst) = (0, 0.0);
+        (self.missed, self.worst) = (0, Duration::ZERO);
     }
 }
 
@@ -262,7 +266,7 @@ mod tests {
     fn quantiles_and_missed_deadlines_are_those_of_the_samples() {
         let mut clock = RealTimeClock::start(9.9995e-3);
         for n in 1..=10_000 {
-            clock.record(f64::from(n) * 1e-6);
+            clock.record(Duration::from_micros(n));
         }
         let timing = clock.timing(3);
         for (quantile, expected) in [(timing.p99, 9.9e-3), (timing.p99_99, 9.999e-3)] {
