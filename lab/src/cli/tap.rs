@@ -1,19 +1,7 @@
 //! A stage around a rig that shows every sample to a function: for `--record` and `--watch`.
 
 use vines::record::Sample;
-use vines::rig::{Command, Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
-
-/// Before the first sample.
-pub(super) fn no_sample() -> Sample {
-    let (sensors, command) = (Sensors::default(), Command::default());
-    Sample {
-        time: 0.0,
-        sensors,
-        command,
-        ground_truth: None,
-        shaker_command: 0.0,
-    }
-}
+use vines::rig::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
 
 /// A rig whose samples are shown to a function, each with the time to the next one, s.
 pub(super) struct Tap<F> {
@@ -24,7 +12,7 @@ pub(super) struct Tap<F> {
 
 impl<F: FnMut(Sample, f64) + 'static> Tap<F> {
     pub(super) fn around(rig: Box<dyn Rig>, on_sample: F) -> Box<dyn Rig> {
-        Box::new(Self { rig, now: no_sample(), on_sample })
+        Box::new(Self { rig, now: Sample::default(), on_sample })
     }
 }
 

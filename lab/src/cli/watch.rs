@@ -26,7 +26,7 @@ use vines::scene::{Excitation, Measurand, Scene, Sensor, Structure};
 use vines::survey::structure_backbone;
 
 use super::failure::Failure;
-use super::tap::{Tap, no_sample};
+use super::tap::Tap;
 
 /// Samples that wait for the evaluation, and rows that a browser gets that comes late: more than a minute of the default scene in real time.
 const KEPT: usize = 1 << 16;
@@ -177,7 +177,7 @@ impl View {
             session,
             rows: VecDeque::new(),
             first: 0,
-            last: Numbered { number: 0, sample: no_sample(), step: 0.0 },
+            last: Numbered { number: 0, sample: Sample::default(), step: 0.0 },
             phase: 0.0,
             impacts: LastImpacts::default(),
             fit: Decay::default(),
