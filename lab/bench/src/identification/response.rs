@@ -37,16 +37,13 @@ const RESPONSE_HARMONICS: usize = 5;
 /// All harmonics that the samples can show.
 const ALL_HARMONICS: Measurand = Measurand::Acceleration;
 
-/// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
-fn degrees(measurand: Measurand, samples_per_period: f64) -> Vec<Option<usize>> {
-    let count = harmonics_of(measurand, samples_per_period, RESPONSE_HARMONICS);
-    [Some(2)].into_iter().chain(vec![Some(0); count - 1]).collect()
-}
-
-/// The harmonics that belong to what `measurand` says, for `n` samples `turn` rad of the motion apart.
-fn basis(n: usize, turn: f64, measurand: Measurand) -> HarmonicBasis {
+/// A straight line and this number of harmonics, whose amplitudes are quadratic in time for the fundamental, and constant for the others, for `n` samples
+/// `turn` rad of the motion apart.
+fn basis(n: usize, turn: f64, harmonics: usize) -> HarmonicBasis {
     let phases: Vec<f64> = (0..n).map(|n| n as f64 * turn).collect();
-    HarmonicBasis::new(&phases, 1, &degrees(measurand, TAU / turn))
+    let mut degrees = vec![Some(0); harmonics];
+    degrees[0] = Some(2);
+    HarmonicBasis::new(&phases, 1, &degrees)
 }
 
 /// Harmonic content of the response, relative to its fundamental.
@@ -106,7 +103,8 @@ impl Content {
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let (n, turn) = (samples.len(), omega * sample_time);
         let mut values = DVector::from_iterator(n, samples.iter().map(reading));
-        let of_all = basis(n, turn, measurand);
+        let count = harmonics_of(measurand, TAU / turn, RESPONSE_HARMONICS);
+        let of_all = basis(n, turn, count);
         if n < 2 * of_all.terms() {
             return None;
         }
@@ -126,15 +124,15 @@ impl Content {
         }
         let content = Self { tones: lines, ..content };
         match is_moving {
-            true => content.changed(&values, turn, measurand),
+            true => content.changed(&values, turn, count),
             false => Some(content),
         }
     }
 
     /// With what a change of the motion, as both halves of the values show it, adds to the errors of the harmonics.
-    fn changed(mut self, values: &DVector<f64>, turn: f64, measurand: Measurand) -> Option<Self> {
+    fn changed(mut self, values: &DVector<f64>, turn: f64, count: usize) -> Option<Self> {
         let (n, half) = (values.len(), values.len() / 2);
-        let of_half = basis(half, turn, measurand);
+        let of_half = basis(half, turn, count);
         let [first, second] =
             [0, n - half].map(|from| of_half.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
         let halves = [first?, second?];
@@ -211,9 +209,7 @@ pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) ->
     let turn = omega * knowledge.sample_time;
     let values: Option<Vec<f64>> = samples.iter().map(|sample| sample.sensors.reference).collect();
     let values = values.filter(|_| 7.0 * turn < PI)?;
-    let phases: Vec<f64> = (0..values.len()).map(|n| n as f64 * turn).collect();
-    let degrees: [_; 7] = std::array::from_fn(|n| Some(if n == 0 { 2 } else { 0 }));
-    let fit = HarmonicBasis::new(&phases, 1, &degrees).fit(&DVector::from_vec(values))?;
+    let fit = basis(values.len(), turn, 7).fit(&DVector::from_vec(values))?;
     let first = fit.harmonic(1).norm();
     (first > 0.0).then(|| std::array::from_fn(|n| fit.harmonic(n + 2).norm() / first))
 }
