@@ -6,7 +6,7 @@ use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Parameters};
 use num_complex::Complex64;
 use vines_model::numerics::{Estimate, mean, noise, noise_at};
-use vines_model::{Definition, Dimensionless, Measurand, Sensor};
+use vines_model::{Dimensionless, Measurand, Sensor};
 use vines_rig::unit::Quantity;
 use vines_rig::{Drive, Sensors};
 
@@ -174,33 +174,6 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// A rig that is as its drawing says.
-    pub fn of(plant: &Parameters, definition: Definition, amplitude: f64, sample_time: f64) -> Self {
-        let linear = LinearResponse::of(plant, definition.reference);
-        let target = Target {
-            phase: definition.phase,
-            measurands: definition.measurands(),
-            omega0: linear.omega0,
-            through_shaker: false,
-            filter: None,
-            delay: 0.0,
-            units: Units::OSCILLATOR,
-            held: false,
-        };
-        Self {
-            linear,
-            is_measured: false,
-            numbers: Dimensionless { definition, ..Dimensionless::of(plant, amplitude) },
-            is_symmetric: plant.has_mirror_images(),
-            carried_up_to: carried_up_to(plant),
-            sample_time,
-            target,
-            shaker: None,
-            nearest_pole: f64::INFINITY,
-            rings: [None; 2],
-        }
-    }
-
     /// The linear response as data, if it was measured on the rig.
     pub fn measured_linear(&self) -> Option<MeasuredLinear> {
         self.is_measured.then(|| self.linear.data())

@@ -46,7 +46,9 @@ use shaker::ShakerSection;
 use structure::StructureSection;
 use toml::Table;
 
-use crate::knowledge::{Knowledge, has_friction};
+use crate::knowledge::{Knowledge, Target, carried_up_to, has_friction};
+use crate::linear::LinearResponse;
+use crate::shaker_path::ShakerPath;
 
 pub use crate::units::{Unit, Units};
 pub use chain::ChainSettings;
@@ -207,18 +209,32 @@ impl Scene {
 
     /// What the scene says of its rig.
     pub fn knowledge(&self) -> Knowledge {
-        let mut knowledge = Knowledge::of(&self.plant, self.definition(), self.amplitude, self.sample_time());
-        knowledge.shaker = self.structure.as_ref().and_then(|structure| structure.shaker_path());
-        if let Some(path) = &mut knowledge.shaker {
-            path.aliased = self.aliased(1.0).unwrap_or(0.0);
+        let (plant, definition, structure) = (&self.plant, self.definition(), self.structure.as_ref());
+        let linear = LinearResponse::of(plant, definition.reference);
+        let aliased = |path| ShakerPath { aliased: self.aliased(1.0).unwrap_or(0.0), ..path };
+        let shaker = structure.and_then(Structure::shaker_path).map(aliased);
+        Knowledge {
+            linear,
+            is_measured: false,
+            numbers: self.dimensionless(),
+            is_symmetric: plant.has_mirror_images(),
+            carried_up_to: carried_up_to(plant),
+            sample_time: self.sample_time(),
+            target: Target {
+                phase: definition.phase,
+                measurands: definition.measurands(),
+                omega0: linear.omega0,
+                through_shaker: shaker.is_some(),
+                filter: self.chain.filter.map(|cut_off| cut_off * linear.omega0),
+                // Of the controller's configuration.
+                delay: 0.0,
+                units: self.units(),
+                held: self.chain.hold,
+            },
+            shaker,
+            nearest_pole: structure.map_or(f64::INFINITY, Structure::nearest_pole),
+            rings: structure.map_or([None; 2], Structure::rings),
         }
-        knowledge.target.through_shaker = knowledge.shaker.is_some();
-        knowledge.target.units = self.units();
-        knowledge.nearest_pole = self.structure.as_ref().map_or(f64::INFINITY, Structure::nearest_pole);
-        knowledge.rings = self.structure.as_ref().map_or([None; 2], Structure::rings);
-        knowledge.target.held = self.chain.hold;
-        knowledge.target.filter = self.chain.filter.map(|cut_off| cut_off * knowledge.linear.omega0);
-        knowledge
     }
 
     /// Number of times the default samples that a shaker needs: a power of two, at most [`OVERSAMPLED`]; 1 without a shaker.
