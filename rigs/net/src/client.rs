@@ -26,9 +26,6 @@ pub const CONNECT: Duration = Duration::from_secs(2);
 /// Time without an answer after which the last datagram is sent again: Hello, the first drive, or the farewell (protocol, "A session"). Also
 /// the interval at which a server is asked again that has another client.
 const RESEND: Duration = Duration::from_millis(50);
-/// How often a farewell is sent until the report of a rig in real time arrives (protocol, "A session"): for 2 s, as Hello. The number counts
-/// and not the time, so that a client on a busy machine also asks for a report that was lost.
-const FAREWELLS: u32 = 40;
 
 /// A session.
 #[derive(Debug)]
@@ -252,7 +249,9 @@ impl NetRig {
 
     /// Ends the session with a rig in real time. If this fails, the server's watchdog does.
     fn farewell(&mut self) -> Result<(), LinkError> {
-        for _ in 0..FAREWELLS {
+        // As often as Hello (protocol, "A session"). The number counts and not the time, so that a client on a busy machine also asks for a report that
+        // was lost.
+        for _ in 0..CONNECT.as_millis() / RESEND.as_millis() {
             self.client.send(self.client.frame(Kind::Farewell))?;
             let end = Instant::now() + RESEND;
             loop {
