@@ -7,6 +7,7 @@ use clap::Args;
 use phase_lock::Config;
 use serde::Serialize;
 use vines::experiment::{ExperimentError, Stage};
+use vines::fmu::process::TemporaryFolder;
 use vines::loop_check::{self, Verdict};
 use vines::net::{ReportLost, Timing};
 use vines::plan::Plan;
@@ -15,7 +16,7 @@ use vines::rig::{BuiltIn, Controller, Fault, Rig};
 use vines::{FileError, ResultFolder, advice, scene::Scene};
 
 use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
-use super::output::{Results, Temporary, Written, output, results, written};
+use super::output::{Results, Written, output, results, written};
 use super::recording::Recording;
 use super::signals::Orderly;
 use super::watch::{Watch, WatchArguments};
@@ -111,7 +112,7 @@ impl ExperimentArguments {
             Some(endpoint) => endpoint.rig(&scene, scope)?,
             None if scene.structure.is_some() => Endpoint::BuiltIn.rig(&scene, scope)?,
             None => {
-                let temporary = tempfile::tempdir().map(Temporary::new).map_err(|error| {
+                let temporary = tempfile::tempdir().map(TemporaryFolder::new).map_err(|error| {
                     let place = std::env::temp_dir();
                     let advice = "set TMPDIR to a folder that can be written to, or use --rig built-in";
                     Failure::run(format!(

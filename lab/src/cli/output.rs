@@ -9,9 +9,8 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use tempfile::TempDir;
 use vines::ResultFolder;
-use vines::fmu::process::{self, Cleanup};
+use vines::fmu::process;
 
 use super::failure::Failure;
 use super::signals::Orderly;
@@ -158,26 +157,6 @@ pub(super) fn results(folder: &Path, names: &'static [&'static str]) -> Result<R
         };
         Failure::input(format!("{error}{advice}"))
     })
-}
-
-/// A temporary folder that is also removed if the program is ended from outside.
-pub(super) struct Temporary(PathBuf, #[expect(dead_code, reason = "removes it")] Cleanup);
-
-impl Temporary {
-    pub(super) fn new(folder: TempDir) -> Self {
-        let folder = folder.keep();
-        let path = std::path::absolute(&folder).unwrap_or(folder);
-        let removed = path.clone();
-        let cleanup = Cleanup::new(move || {
-            // Best effort: an empty folder does no harm.
-            let _ = std::fs::remove_dir_all(removed);
-        });
-        Self(path, cleanup)
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        &self.0
-    }
 }
 
 /// Warnings on stderr.

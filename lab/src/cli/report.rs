@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use vines::fmu::process::TemporaryFolder;
 use vines::map::LIMIT;
 use vines::regime_map::{Axis, Map};
 use vines::rig::BuiltIn;
 use vines::scene::Scene;
 
 use super::experiment::INTERRUPTED_FILE;
-use super::output::{Temporary, results, written};
+use super::output::{results, written};
 use super::shell::quoted;
 use super::summary::{ideal, parameters};
 use super::{Cli, dispatch};
@@ -127,7 +128,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     BuiltIn::new(&scene.plan().lock)?;
     let folder = results(&arguments.out, &FILES)?;
     // The files of all commands are put in place together.
-    let new = Temporary::new(tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?);
+    let new = TemporaryFolder::new(tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?);
     let mut failed = Vec::new();
     let mut sections = Vec::new();
     for section in SECTIONS {

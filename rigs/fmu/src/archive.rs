@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use fmi2_description::Description;
 use zip::ZipArchive;
 
-use crate::process::Cleanup;
+use crate::process::TemporaryFolder;
 
 const DESCRIPTION: &str = "modelDescription.xml";
 
@@ -36,8 +36,7 @@ pub fn own_platforms() -> impl Iterator<Item = (&'static str, &'static str)> {
 /// An FMU in a folder that is removed with it.
 pub(crate) struct Unpacked {
     pub description: Description,
-    folder: PathBuf,
-    _cleanup: Cleanup,
+    folder: TemporaryFolder,
 }
 
 impl Unpacked {
@@ -56,13 +55,7 @@ impl Unpacked {
                 let place = std::env::temp_dir();
                 format!("it cannot be unpacked to {}: {error}", place.display())
             })?;
-        // Absolute: an FMU may change the working folder.
-        let folder = folder.keep();
-        let folder = std::path::absolute(&folder).unwrap_or(folder);
-        let removed = folder.clone();
-        let _cleanup = Cleanup::new(move || {
-            let _ = fs::remove_dir_all(removed);
-        });
+        let folder = TemporaryFolder::new(folder);
         let mut nested = None;
         for n in 0..archive.len() {
             let mut entry = archive.by_index(n).map_err(|error| damaged(&error))?;
@@ -74,16 +67,16 @@ impl Unpacked {
             if parts.is_empty() || parts.iter().any(|part| *part == ".." || part.contains(':')) {
                 continue;
             }
-            let to = folder.join(parts.iter().collect::<PathBuf>());
+            let to = folder.path().join(parts.iter().collect::<PathBuf>());
             let unpacked = if entry.is_dir() || name.ends_with('/') {
                 fs::create_dir_all(&to)
             } else {
-                let parent = to.parent().unwrap_or(&folder);
+                let parent = to.parent().unwrap_or(folder.path());
                 fs::create_dir_all(parent).and_then(|()| io::copy(&mut entry, &mut File::create(&to)?).map(drop))
             };
             unpacked.map_err(|error| format!("{name} cannot be unpacked: {error}"))?;
         }
-        let text = fs::read(folder.join(DESCRIPTION)).map_err(|_| match nested {
+        let text = fs::read(folder.path().join(DESCRIPTION)).map_err(|_| match nested {
             Some(nested) => {
                 format!("its {DESCRIPTION} is {nested}; zip the content of that folder, not the folder itself")
             }
@@ -98,17 +91,17 @@ impl Unpacked {
             let version = &description.fmi_version;
             return Err(format!("it has FMI version {version}; version 2.0 is needed"));
         }
-        Ok(Self { description, folder, _cleanup })
+        Ok(Self { description, folder })
     }
 
     /// The folder of the resources.
     pub fn resources(&self) -> PathBuf {
-        self.folder.join("resources")
+        self.folder.path().join("resources")
     }
 
     /// The folder with everything.
     pub fn folder(&self) -> &Path {
-        &self.folder
+        self.folder.path()
     }
 
     /// The library for this machine.
@@ -116,7 +109,7 @@ impl Unpacked {
     /// # Errors
     /// What the FMU has instead, as the end of a sentence.
     pub fn library(&self, identifier: &str) -> Result<PathBuf, String> {
-        let binaries = self.folder.join("binaries");
+        let binaries = self.folder.path().join("binaries");
         let mut folders: Vec<&str> = own_platforms().map(|(folder, _)| folder).collect();
         // FMI 2.0 has no name for ARM: exporters use that of the other processor.
         folders.extend(
@@ -139,7 +132,7 @@ impl Unpacked {
             return Err(format!("{needed}, and that folder has {files}"));
         }
         Err(match present.is_empty() {
-            true if self.folder.join("sources").is_dir() => {
+            true if self.folder.path().join("sources").is_dir() => {
                 format!("it has source code only, and {needed}: compile it, or export it with a library")
             }
             true => format!("it has no libraries, and {needed}"),

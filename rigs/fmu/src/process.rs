@@ -7,11 +7,12 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, AtomicU32, AtomicU64, Ordering::SeqCst};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use libc::c_int;
+use tempfile::TempDir;
 
 /// A signal that ends a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,6 +132,32 @@ impl Drop for Cleanup {
         if let Some(remove) = remove {
             remove();
         }
+    }
+}
+
+/// A temporary folder that is removed when it is dropped and when the process ends by [`end`].
+#[derive(Debug)]
+pub struct TemporaryFolder {
+    path: PathBuf,
+    _cleanup: Cleanup,
+}
+
+impl TemporaryFolder {
+    /// The folder `folder`, whose path becomes absolute: an FMU may change the working folder.
+    pub fn new(folder: TempDir) -> Self {
+        let folder = folder.keep();
+        let path = std::path::absolute(&folder).unwrap_or(folder);
+        let removed = path.clone();
+        let _cleanup = Cleanup::new(move || {
+            // Best effort: an old folder does no harm.
+            let _ = std::fs::remove_dir_all(removed);
+        });
+        Self { path, _cleanup }
+    }
+
+    /// Its path.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 }
 
