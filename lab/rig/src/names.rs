@@ -9,7 +9,7 @@ use crate::unit::UNITS;
 
 /// A variable of a rig or a controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "NameSection")]
+#[serde(try_from = "NameSection", into = "NameSection")]
 pub struct Name {
     /// Its name there.
     pub name: String,
@@ -18,6 +18,8 @@ pub struct Name {
     /// The SI unit, if the scene gives a unit.
     #[serde(skip)]
     pub si: Option<&'static str>,
+    /// Whether the scene gives its unit or factor, against what a variable may declare itself.
+    pub is_explicit: bool,
 }
 
 /// As written: `"name"`, or a table with `name` and one of `unit` and `factor`.
@@ -44,7 +46,7 @@ impl Name {
             let symbols = UNITS.map(|(symbol, ..)| symbol).join(", ");
             return Err(format!("{name}: the unit {unit} is unknown; known are {symbols}, or give a factor").into());
         };
-        Ok(Self { name: name.into(), factor, si: Some(si) })
+        Ok(Self { name: name.into(), factor, si: Some(si), is_explicit: true })
     }
 }
 
@@ -56,6 +58,7 @@ impl TryFrom<NameSection> for Name {
             NameSection::Plain(name) => (name, None, None),
             NameSection::Full { name, unit, factor } => (name, unit, factor),
         };
+        let is_explicit = factor.is_some();
         let factor = match (unit, factor) {
             (Some(_), Some(_)) => return Err(format!("{name}: give a unit or a factor, not both").into()),
             (Some(unit), None) => return Self::with_unit(&name, &unit),
@@ -64,30 +67,12 @@ impl TryFrom<NameSection> for Name {
         if !factor.is_finite() || factor == 0.0 {
             return Err(format!("{name}: the factor {factor} must be a finite number other than 0").into());
         }
-        Ok(Self { name, factor, si: None })
+        Ok(Self { name, factor, si: None, is_explicit })
     }
 }
 
-/// A variable, and whether the scene gives its unit or factor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "NameSection", into = "NameSection")]
-struct Mapped {
-    name: Name,
-    is_explicit: bool,
-}
-
-impl TryFrom<NameSection> for Mapped {
-    type Error = ArgumentError;
-
-    fn try_from(written: NameSection) -> Result<Self, ArgumentError> {
-        let is_explicit =
-            matches!(&written, NameSection::Full { unit, factor, .. } if unit.is_some() || factor.is_some());
-        Ok(Self { name: written.try_into()?, is_explicit })
-    }
-}
-
-impl From<Mapped> for NameSection {
-    fn from(Mapped { name: Name { name, factor, .. }, is_explicit }: Mapped) -> Self {
+impl From<Name> for NameSection {
+    fn from(Name { name, factor, is_explicit, .. }: Name) -> Self {
         match is_explicit {
             true => Self::Full { name, unit: None, factor: Some(factor) },
             false => Self::Plain(name),
@@ -98,23 +83,18 @@ impl From<Mapped> for NameSection {
 /// The names that differ, by the names of this bench.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Names(BTreeMap<String, Mapped>);
+pub struct Names(BTreeMap<String, Name>);
 
 impl Names {
     /// The variable for `ours`; if it is not mapped, it has the same name, in SI units.
     pub fn of(&self, ours: &str) -> Name {
-        let same = || Name { name: ours.into(), factor: 1.0, si: None };
+        let same = || Name { name: ours.into(), factor: 1.0, si: None, is_explicit: false };
         self.mapped(ours).cloned().unwrap_or_else(same)
     }
 
     /// The variable for `ours`, if it is mapped.
     pub fn mapped(&self, ours: &str) -> Option<&Name> {
-        self.0.get(ours).map(|mapped| &mapped.name)
-    }
-
-    /// Whether the scene gives the unit or factor of the variable for `ours`, against what a variable may declare itself.
-    pub fn is_explicit(&self, ours: &str) -> bool {
-        self.0.get(ours).is_some_and(|mapped| mapped.is_explicit)
+        self.0.get(ours)
     }
 
     /// Whether nothing is mapped.

@@ -392,7 +392,7 @@ fn connect(
     description: &Description,
     path: &Path,
 ) -> Result<Connection, FmuError> {
-    let Name { name, factor, si: given } = names.of(ours);
+    let Name { name, factor, si: given, is_explicit } = names.of(ours);
     if let Some(unit) = given.filter(|given| !is_unit_of(given, si)) {
         let unit = unit.into();
         return Err(FmuError::Quantity { name: ours.into(), unit, ours: si });
@@ -421,7 +421,7 @@ fn connect(
     };
     let unit = description.unit_of(variable);
     let scale = match unit {
-        Some(unit) if !names.is_explicit(ours) => {
+        Some(unit) if !is_explicit => {
             let base = description.base_unit(unit);
             let (scale, unit) = (scale(unit, base, si), unit.to_owned());
             let (path, name, defined) = (path.into(), ours.into(), base.is_some());
