@@ -233,27 +233,6 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     driven: bool,
 }
 
-/// One sample of rig and controller, at a time, s, and until the next one a step, s, later: the rig is read, the controller answers, and the rig is
-/// driven. `before_drive` may refuse the drive.
-///
-/// # Errors
-/// A failure of the rig or of the controller, or the refusal.
-pub fn exchange(
-    rig: &mut (impl Rig + ?Sized),
-    controller: &mut (impl Controller + ?Sized),
-    active: bool,
-    [time, step]: [f64; 2],
-    before_drive: impl FnOnce(&Sample) -> Result<(), ExperimentError>,
-) -> Result<Sample, ExperimentError> {
-    let sensors = rig.sense()?;
-    let command = controller.sample(sensors, active)?;
-    let ground_truth = rig.ground_truth()?;
-    let sample = Sample { time, sensors, command, ground_truth, ..Sample::default() };
-    before_drive(&sample)?;
-    rig.advance(command.drive, step)?;
-    Ok(sample)
-}
-
 /// A period of the drive in a record: its first sample, and the phase of the drive there, turns.
 pub(crate) type Period = (usize, f64);
 
@@ -294,36 +273,35 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             self.stage = (stage, self.taken);
         }
         let active = !matches!(stage, Stage::Releasing | Stage::Decaying);
-        let clock = [self.taken as f64 * self.sample_time, self.sample_time];
-        let is_latched = |command: &Command| command.state.is_some_and(LoopState::is_latched);
-        let since_release = self.natural_periods(self.taken - self.stage.1 + 1);
-        let (config, plan, target) = (self.config, self.plan, self.plan.knowledge.target);
-        let (samples, driven) = (&mut *self.samples, &mut self.driven);
-        let before_drive = |sample: &Sample| {
-            let command = checked(sample.command, target.units.reference)?;
-            samples.push(*sample);
-            let is_off = command.drive.is_off();
-            if stage == Stage::Decaying && !is_off {
-                let commanded = drive_in_words(command.drive, plan);
-                return Err(ExperimentError::Refused(format!(
-                    "drives again: {since_release:.1} periods after it released the drive, it commands {commanded}"
-                )));
-            }
-            if (active || !is_off) && !is_latched(&command) {
-                guard(config, &target, sample.sensors.response, command.drive)?;
-            }
-            *driven = true;
-            Ok(())
-        };
-        let Sample { command, .. } = exchange(&mut self.rig, self.controller, active, clock, before_drive)?;
+        let sensors = self.rig.sense()?;
+        let command = self.controller.sample(sensors, active)?;
+        let ground_truth = self.rig.ground_truth()?;
+        let time = self.taken as f64 * self.sample_time;
+        let target = &self.plan.knowledge.target;
+        let command = checked(command, target.units.reference)?;
+        self.samples
+            .push(Sample { time, sensors, command, ground_truth, ..Sample::default() });
+        let (is_off, is_latched) = (command.drive.is_off(), command.state.is_some_and(LoopState::is_latched));
+        if stage == Stage::Decaying && !is_off {
+            return Err(ExperimentError::Refused(format!(
+                "drives again: {:.1} periods after it released the drive, it commands {}",
+                self.natural_periods(self.taken - self.stage.1 + 1),
+                drive_in_words(command.drive, self.plan)
+            )));
+        }
+        if (active || !is_off) && !is_latched {
+            guard(self.config, target, sensors.response, command.drive)?;
+        }
+        self.driven = true;
+        self.rig.advance(command.drive, self.sample_time)?;
         if let Some((last, command)) = self.samples.last_mut().zip(self.rig.shaker_command()) {
             last.shaker_command = command;
         }
-        self.driven = !command.drive.is_off();
+        self.driven = !is_off;
         self.taken += 1;
         self.last = command;
         self.periods += command.drive.omega * self.sample_time / TAU;
-        if active && is_latched(&command) {
+        if active && is_latched {
             self.ramp_down(command)?;
             return Err(self.tripped(stage, &command));
         }

@@ -4,9 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use lovines::{Event, Plant, Wall};
 use phase_lock::Output;
-use vines_bench::experiment::{ExperimentError, exchange};
+use vines_bench::experiment::ExperimentError;
 use vines_bench::live::{Decay, HarmonicMotion};
-use vines_bench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Rig, Sensors};
+use vines_bench::rig::{BuiltIn, Controller, Drive, Rig, Sensors};
 use vines_bench::scene::Scene;
 use vines_model::regime::Regime;
 
@@ -140,7 +140,7 @@ impl Bench {
 
     /// One sample: sensors, controller, drive. Returns the row of the record.
     ///
-    /// This is the exchange of `ControlLoop`, without its record, its judgement of the lock and its end after a fault: the page keeps
+    /// This is a sample of `ControlLoop`, without its record, its judgement of the lock and its end after a fault: the page keeps
     /// running for hours, also with the loop open, with settings that change and after a trip.
     fn sample(&mut self, is_last: bool) -> Result<Row, Message> {
         let due = self.tracking.as_mut().and_then(|tracking| tracking.due(self.samples));
@@ -155,9 +155,11 @@ impl Bench {
         let (before, speed) = (is_last.then_some(*plant), plant.state().dq2.abs());
         let relative = plant.relative_displacement();
         self.decay.watch(&self.rig.impacts, self.rig.phase);
-        let mut controller = Requested { controller: &mut self.controller, constant };
-        let sample = exchange(&mut self.rig, &mut controller, self.active, [time, step], |_| Ok(()))?;
-        let (Sensors { response, reference }, drive) = (sample.sensors, sample.command.drive);
+        let sensors = self.rig.sense().map_err(ExperimentError::from)?;
+        let command = self.controller.sample(sensors, self.active);
+        let drive = constant.unwrap_or(command.map_err(ExperimentError::from)?.drive);
+        self.rig.advance(drive, step).map_err(ExperimentError::from)?;
+        let Sensors { response, reference } = sensors;
         let output = self.controller.output;
         let mut motion = HarmonicMotion {
             omega: drive.omega,
@@ -270,19 +272,6 @@ impl Bench {
     /// The plant at the next sample.
     pub fn plant(&self) -> &Plant {
         &self.rig.plant
-    }
-}
-
-/// The controller, whose drive is replaced by a constant one while the loop is open.
-struct Requested<'a> {
-    controller: &'a mut BuiltIn,
-    constant: Option<Drive>,
-}
-
-impl Controller for Requested<'_> {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        let command = self.controller.sample(sensors, active)?;
-        Ok(Command { drive: self.constant.unwrap_or(command.drive), ..command })
     }
 }
 
