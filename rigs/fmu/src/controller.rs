@@ -116,8 +116,10 @@ impl FmuController {
     fn response_loop(&self) -> Result<Vec<Variable>, ControllerError> {
         self.response_loop.clone().map_err(ControllerError::NoResponseLoop)
     }
+}
 
-    fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
+impl Controller for FmuController {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         let fmu = &mut self.fmu;
         fmu.set(self.response, sensors.response)?;
         if let Some(reference) = self.reference {
@@ -147,12 +149,6 @@ impl FmuController {
             state: state?.and_then(|number| LoopState::of_number(number as i32)),
             fault: fault?.and_then(|number| Fault::of_number(number as i32)),
         })
-    }
-}
-
-impl Controller for FmuController {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        Ok(self.exchange(sensors, active)?)
     }
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {

@@ -215,38 +215,6 @@ impl NetRig {
         Arc::clone(&self.timing)
     }
 
-    /// The reading of the present sample.
-    fn reading(&mut self) -> Result<Sensors, LinkError> {
-        let end = Instant::now() + self.client.silence;
-        loop {
-            if let Some(taken) = self.readings.take(&mut self.client.counters) {
-                self.ground_truth = taken.ground_truth.or(self.ground_truth);
-                return Ok(taken.sensors);
-            }
-            let frame = self.client.receive(end)?.ok_or_else(|| self.client.silent())?;
-            if frame.kind == Kind::Sensors {
-                let (reading, counters) = (read_reading(&frame), &mut self.client.counters);
-                let samples = self.readings.arrive(frame.sequence, reading, counters);
-                let Client { peer, sample_time, silence, .. } = self.client;
-                let (seconds, allowed) = (samples as f64 * sample_time, silence.as_secs_f64());
-                if seconds > allowed {
-                    let time = self.client.time();
-                    return Err(LinkError::Blackout { peer, samples, seconds, allowed, time });
-                }
-            }
-        }
-    }
-
-    fn drive(&mut self, drive: Drive, step: f64) -> Result<(), LinkError> {
-        let command = Command { drive, ..Command::default() };
-        self.client
-            .send(write_command(self.client.frame(Kind::Drive), &command))?;
-        self.client.at += 1;
-        // A rig that plays samples has no frequency: then a line is all that bridges a gap.
-        self.readings.advance(drive.omega * step / TAU);
-        Ok(())
-    }
-
     /// Ends the session with a rig in real time. If this fails, the server's watchdog does.
     fn farewell(&mut self) -> Result<(), LinkError> {
         // As often as Hello (protocol, "A session"). The number counts and not the time, so that a client on a busy machine also asks for a report that
@@ -273,15 +241,38 @@ impl NetRig {
 
 impl Rig for NetRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        Ok(self.reading()?)
+        let end = Instant::now() + self.client.silence;
+        loop {
+            if let Some(taken) = self.readings.take(&mut self.client.counters) {
+                self.ground_truth = taken.ground_truth.or(self.ground_truth);
+                return Ok(taken.sensors);
+            }
+            let frame = self.client.receive(end)?.ok_or_else(|| self.client.silent())?;
+            if frame.kind == Kind::Sensors {
+                let (reading, counters) = (read_reading(&frame), &mut self.client.counters);
+                let samples = self.readings.arrive(frame.sequence, reading, counters);
+                let Client { peer, sample_time, silence, .. } = self.client;
+                let (seconds, allowed) = (samples as f64 * sample_time, silence.as_secs_f64());
+                if seconds > allowed {
+                    let time = self.client.time();
+                    return Err(LinkError::Blackout { peer, samples, seconds, allowed, time }.into());
+                }
+            }
+        }
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        Ok(self.drive(drive, step)?)
+        let command = Command { drive, ..Command::default() };
+        self.client
+            .send(write_command(self.client.frame(Kind::Drive), &command))?;
+        self.client.at += 1;
+        // A rig that plays samples has no frequency: then a line is all that bridges a gap.
+        self.readings.advance(drive.omega * step / TAU);
+        Ok(())
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        self.reading()?;
+        self.sense()?;
         Ok(self.ground_truth)
     }
 }
@@ -333,34 +324,6 @@ impl NetController {
         self.client.counters
     }
 
-    fn ask(&mut self, sensors: Sensors, active: bool) -> Result<Command, LinkError> {
-        let reading = Reading { sensors, ground_truth: None };
-        let mut frame = write_reading(self.client.frame(Kind::Sensors), &reading);
-        frame.flags |= bit(flag::ACTIVE, active);
-        self.client.send(frame)?;
-        let now = Instant::now();
-        let end = *self.waiting.get_or_insert(now) + self.client.silence;
-        let until = self.patience.map_or(end, |patience| (now + patience).min(end));
-        let command = loop {
-            let Some(frame) = self.client.receive(until)? else {
-                if Instant::now() >= end {
-                    return Err(self.client.silent());
-                }
-                self.client.counters.hold(self.client.at + 1 - self.answered);
-                break self.held();
-            };
-            self.good = self.read(&frame)?;
-            self.waiting = None;
-            self.answered = frame.sequence + 1;
-            if frame.sequence == self.client.at {
-                break self.good;
-            }
-            self.client.counters.late += 1;
-        };
-        self.client.at += 1;
-        Ok(command)
-    }
-
     /// The last answer, for a sample without one. It also lasts beyond the release: the bench waits for the answer to that.
     fn held(&self) -> Command {
         let settled = self.good.settled.map(|_| false);
@@ -379,7 +342,31 @@ impl NetController {
 
 impl Controller for NetController {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        Ok(self.ask(sensors, active)?)
+        let reading = Reading { sensors, ground_truth: None };
+        let mut frame = write_reading(self.client.frame(Kind::Sensors), &reading);
+        frame.flags |= bit(flag::ACTIVE, active);
+        self.client.send(frame)?;
+        let now = Instant::now();
+        let end = *self.waiting.get_or_insert(now) + self.client.silence;
+        let until = self.patience.map_or(end, |patience| (now + patience).min(end));
+        let command = loop {
+            let Some(frame) = self.client.receive(until)? else {
+                if Instant::now() >= end {
+                    return Err(self.client.silent().into());
+                }
+                self.client.counters.hold(self.client.at + 1 - self.answered);
+                break self.held();
+            };
+            self.good = self.read(&frame)?;
+            self.waiting = None;
+            self.answered = frame.sequence + 1;
+            if frame.sequence == self.client.at {
+                break self.good;
+            }
+            self.client.counters.late += 1;
+        };
+        self.client.at += 1;
+        Ok(command)
     }
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
