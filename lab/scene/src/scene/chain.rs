@@ -85,29 +85,11 @@ impl Scene {
 }
 
 impl ChainSettings {
-    /// Whether anything is switched on.
+    /// Whether anything is switched on; ranges and a seed alone switch nothing on.
     pub fn is_on(&self) -> bool {
-        let Self {
-            adc_bits,
-            dac_bits,
-            hold,
-            snr,
-            response_noise,
-            reference_noise,
-            filter,
-            jitter,
-            delay,
-            reference,
-            ..
-        } = *self;
-        let is_noisy = snr.or(response_noise).or(reference_noise).is_some();
-        adc_bits.or(dac_bits).is_some()
-            || hold
-            || is_noisy
-            || filter.is_some()
-            || jitter > 0.0
-            || delay > 0
-            || !reference
+        let Self { response_range, base_range, seed, .. } = *self;
+        let off = Self { response_range, base_range, seed, ..Self::default() };
+        *self != off
     }
 
     /// Delay from the drive to the sensors, in units of 1/omega0, for samples `step` apart: on average, a held sample lags by half a
