@@ -31,8 +31,6 @@ pub struct Cycle {
     pub noise: [f64; 2],
     /// Second harmonics of response and base, scaled as their fundamentals are, m.
     pub second: [Complex<f64>; 2],
-    /// How often the sensor of the response differentiates the displacement.
-    pub order: i32,
     /// Number of samples.
     pub samples: usize,
 }
@@ -156,7 +154,6 @@ impl Cycle {
             phase_error,
             noise: [noise, base_noise],
             second: [second, base_second],
-            order: target.measurands[0].order(),
             samples: samples.len(),
         })
     }

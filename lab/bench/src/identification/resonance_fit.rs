@@ -58,7 +58,7 @@ impl ResonanceFit {
         let omega = mean(cycles.iter().map(|cycle| cycle.omega));
         let growth = knowledge.growth(omega);
         let (gain, u_gain) = (growth.value, growth.uncertainty / growth.value);
-        let motion = motion(cycles);
+        let motion = motion(cycles, knowledge.target.measurands[0].order());
         let response = mean(motion.iter().map(|cycle| cycle.amplitude));
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
         let [noise, base_noise] = Cycle::noise_of(cycles, is_held);
@@ -217,8 +217,8 @@ struct PeriodResponse {
 /// Amplitudes and phases of the response, continuous from period to period, without the influence of their own drift.
 ///
 /// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
-/// -i conj(z')/2.
-fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
+/// -i conj(z')/2. `order`: how often the sensor of the response differentiates the displacement.
+fn motion(cycles: &[Cycle], order: i32) -> Vec<PeriodResponse> {
     let mut before = cycles[0].response;
     let mut turned = before.arg();
     let phases: Vec<f64> = cycles
@@ -241,7 +241,7 @@ fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
             let z = cycles[n].response;
             let drift = Complex::new(growth, turning) * z / amplitude;
             // A sensor of a derivative reads (i omega + s)^n times a displacement that drifts at the complex rate s.
-            let derived = Complex::new(-turning, growth) * (f64::from(cycles[n].order) / amplitude);
+            let derived = Complex::new(-turning, growth) * (f64::from(order) / amplitude);
             let correction = Complex::new(0.0, 0.5) * drift.conj() / z + derived;
             PeriodResponse {
                 amplitude: amplitude * (1.0 + correction.re),
