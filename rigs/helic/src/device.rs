@@ -29,8 +29,6 @@ const SOURCES: &str =
 const MILLI: f64 = 1e-3;
 /// Turns of the phase accumulator per turn of the phase.
 const TURN: f64 = 4_294_967_296.0;
-/// The command counter is exact as a float.
-const EPOCH: u32 = 1 << 24;
 /// Longest time before a packet is sent, s (protocol, "Stream channel").
 const FLUSH: f64 = 0.005;
 
@@ -211,7 +209,8 @@ impl Device {
         };
         require(is_allowed, ErrorCode::BadValue)?;
         parameter.values = values;
-        self.epoch = (self.epoch + u32::from(is_command)) % EPOCH;
+        // Exact as a float.
+        self.epoch = (self.epoch + u32::from(is_command)) % (1 << f32::MANTISSA_DIGITS);
         Ok(())
     }
 

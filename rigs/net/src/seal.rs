@@ -7,8 +7,6 @@ use sha2::{Digest, Sha256};
 
 use crate::frame::{Frame, FrameError, Kind, SIZE};
 
-/// Length of the authentication code, HMAC-SHA-256, bytes.
-const TAG: usize = 32;
 /// Shortest secret, bytes: 128 bits, which cannot be guessed.
 const SECRET: usize = 16;
 
@@ -55,9 +53,9 @@ impl Seal {
         Self { key, side, session: None }
     }
 
-    /// Length of a frame, bytes.
+    /// Length of a frame, bytes, with its authentication code, HMAC-SHA-256.
     pub fn size(&self) -> usize {
-        SIZE + if self.key.is_some() { TAG } else { 0 }
+        SIZE + self.key.map_or(0, |_| Sha256::output_size())
     }
 
     /// Draws the server's number of a session: integers that are exact as values of a frame, or zeros without a key.
