@@ -172,9 +172,6 @@ const OSCILLATOR_ORBITS: usize = 3000;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
-/// A curve to draw: sigma and C of its points, and whether the motion is stable or neutral there.
-pub type DrawnCurve = Vec<([f64; 2], bool)>;
-
 /// C, sigma, G and speed of the particle of an exact orbit.
 type Place = [f64; 4];
 
@@ -189,7 +186,7 @@ pub struct ExactCurve {
     /// order in which they were continued, because near another mode the speed of the particle rises and falls along a curve.
     compared: Vec<Vec<Place>>,
     /// All curves, to be drawn; of one oscillator beyond the fold.
-    pub curves: Vec<DrawnCurve>,
+    pub curves: Vec<Vec<Orbit>>,
     /// It has more modes than the theory beside it.
     pub is_of_structure: bool,
 }
@@ -230,7 +227,7 @@ impl ExactCurve {
                 Self {
                     compared,
                     is_of_structure: true,
-                    ..Self::nearest(ExactOrbits::of(scene, numbers), &curves, near)
+                    ..Self::nearest(ExactOrbits::of(scene, numbers), curves, near)
                 }
             }
             None => Self::of(numbers),
@@ -244,16 +241,17 @@ impl ExactCurve {
             curve.points.retain(|orbit| orbit.b >= flow.manifold.b_min());
             curve.points
         };
-        let curves: Vec<_> = backbone(scene, None, OSCILLATOR_ORBITS)
-            .into_iter()
-            .map(beyond_fold)
-            .collect();
+        let curves = backbone(scene, None, OSCILLATOR_ORBITS).into_iter().map(beyond_fold);
         let middle = flow.backbone_at(0.5 * (flow.manifold.b_min() + B_SYMMETRY_BREAKING));
-        Self::nearest(ExactOrbits::of_oscillator(scene), &curves, [middle.sigma, middle.c])
+        Self::nearest(
+            ExactOrbits::of_oscillator(scene),
+            curves.collect(),
+            [middle.sigma, middle.c],
+        )
     }
 
     /// The one of some curves that is nearest to `near`.
-    fn nearest(orbits: ExactOrbits, curves: &[Vec<Orbit>], near: [f64; 2]) -> Self {
+    fn nearest(orbits: ExactOrbits, curves: Vec<Vec<Orbit>>, near: [f64; 2]) -> Self {
         let distance = |curve: &[Place]| {
             let distances = curve.iter().map(|[c, sigma, ..]| (sigma - near[0]).hypot(c - near[1]));
             distances.fold(f64::INFINITY, f64::min)
@@ -261,12 +259,11 @@ impl ExactCurve {
         let rising = curves.iter().map(|curve| right_of_fold(curve));
         let nearest = rising.min_by(|one, other| distance(one).total_cmp(&distance(other)));
         let places = nearest.unwrap_or_default();
-        let place = |orbit: &Orbit| ([orbit.sigma, orbit.c], !orbit.is_unstable());
         Self {
             orbits,
             compared: vec![places.clone()],
             places,
-            curves: curves.iter().map(|curve| curve.iter().map(place).collect()).collect(),
+            curves,
             is_of_structure: false,
         }
     }

@@ -90,7 +90,7 @@ fn first_order_beside(exact: &ExactCurve) -> &'static str {
 /// Adds the exact backbone.
 fn add_exact(panel: &mut Panel, exact: &ExactCurve, colour: &'static str, label: &str) {
     for curve in &exact.curves {
-        let places = curve.iter().map(|([sigma, c], stable)| ((*sigma, *c), *stable));
+        let places = curve.iter().map(|orbit| ((orbit.sigma, orbit.c), !orbit.is_unstable()));
         panel.curve(places, 1.6, colour, label);
     }
 }
