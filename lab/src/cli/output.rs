@@ -128,11 +128,6 @@ impl Results {
         };
         (self.text + &files, Failure::first_of(failures))
     }
-
-    /// The text, and the failures of writing the files.
-    pub(super) fn unseen(self) -> (String, Option<Failure>) {
-        (self.text, Failure::first_of((self.write)().failures))
-    }
 }
 
 /// The paths that were written, in one line.

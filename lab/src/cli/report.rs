@@ -152,7 +152,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         super::say(&shown);
         let command = Cli::try_parse_from(words(arguments, &line, new.path())).map_err(Failure::input)?;
         let (mut text, failure) = match dispatch(command.command) {
-            Ok(results) => results.unseen(),
+            Ok(results) => results.texts(),
             Err(failure) => (String::new(), Some(failure)),
         };
         if let Some(failure) = failure {
