@@ -189,7 +189,7 @@ pub fn off_backbone(curves: &[Vec<Orbit>], at: &ResonancePoint, shared: f64) -> 
 /// The record of an experiment.
 pub fn record(rig: &mut dyn Rig, plan: &Plan) -> Result<Record, ExperimentError> {
     let mut controller = BuiltIn::new(&plan.lock).map_err(ControllerError::from)?;
-    run(&mut Vec::new(), rig, &mut controller, plan, |_, _, _| {})
+    run(&mut Vec::new(), rig, &mut controller, plan, |_, _| {})
 }
 
 /// The tracked backbone, with a drive up to G = `largest`.
@@ -197,7 +197,7 @@ pub fn tracked(rig: &mut dyn Rig, plan: &Plan, largest: f64) -> Result<Tracked, 
     let mut plan = plan.clone();
     plan.tracking.amplitude_max = Some(plan.knowledge.numbers.amplitude(largest));
     let mut controller = BuiltIn::new(&plan.tracking).map_err(ControllerError::from)?;
-    track(&mut Vec::new(), rig, &mut controller, &plan, |_, _| {})
+    track(&mut Vec::new(), rig, &mut controller, &plan, |_| {})
 }
 
 /// A plant behind the chain of a scene.

@@ -68,7 +68,7 @@ pub fn identify(py: Python<'_>, scene: &Scene, decay: bool) -> PyResult<String> 
     }
     let mut controller = BuiltIn::new(&plan.lock).map_err(invalid)?;
     experiment(py, scene, move |rig, scene| {
-        let record = experiment::run(&mut Vec::new(), rig, &mut controller, &plan, |_, _, _| {})?;
+        let record = experiment::run(&mut Vec::new(), rig, &mut controller, &plan, |_, _| {})?;
         let found = identification::identify(&record, &plan)?;
         Ok(Comparison::of(&found, scene))
     })
@@ -80,7 +80,7 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     let plan = scene.plan();
     let mut controller = BuiltIn::new(&plan.tracking).map_err(invalid)?;
     experiment(py, scene, move |rig, scene| {
-        let tracked = track(&mut Vec::new(), rig, &mut controller, &plan, |_, _| {})?;
+        let tracked = track(&mut Vec::new(), rig, &mut controller, &plan, |_| {})?;
         Ok(TrackedComparison::of(&tracked, scene))
     })
 }

@@ -201,7 +201,7 @@ fn locked(scene: &CheckedScene, stop: &Arc<AtomicBool>) -> Result<Lock, Box<dyn 
     let plan = Plan { decay: 0, ..scene.plan() };
     let mut rig = Stoppable::around(Simulated::of(scene)?, scene.sample_time(), stop);
     let mut controller = BuiltIn::new(&plan.lock)?;
-    let record = experiment::run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _, _| {})?;
+    let record = experiment::run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _| {})?;
     Ok(identification::identify(&record, &plan)?.lock)
 }
 

@@ -105,7 +105,7 @@ struct Tracker<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     end: Option<String>,
 }
 
-/// Tracks the backbone, and leaves what was measured last in `samples` if it ends before the first point.
+/// Tracks the backbone, and leaves what was measured last in `samples` if it ends before the first point. `progress` receives the number of levels done.
 ///
 /// # Errors
 /// A failure of the rig or of the controller, or no lock in the time allowed.
@@ -114,7 +114,7 @@ pub fn track(
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
     plan: &Plan,
-    progress: impl FnMut(usize, usize),
+    progress: impl FnMut(usize),
 ) -> Result<Tracked, ExperimentError> {
     let mut quiet = |_, _| {};
     let mut run = ControlLoop::new(rig, controller, plan, &plan.tracking, samples, &mut quiet)?;
@@ -151,10 +151,10 @@ pub fn track(
 
 impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
     /// Goes through the levels. Returns whether the curve has ended.
-    fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<bool, ExperimentError> {
+    fn follow(&mut self, mut progress: impl FnMut(usize)) -> Result<bool, ExperimentError> {
         let levels = &self.plan.levels;
         for (n, &level) in levels.iter().enumerate() {
-            progress(n, levels.len());
+            progress(n);
             let mut before = n
                 .checked_sub(1)
                 .map(|before| (levels[before], self.points[before].regime));

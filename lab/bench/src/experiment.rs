@@ -150,17 +150,15 @@ pub enum ExperimentError {
     ResponseTooLarge { response: Quantity, limit: String },
 }
 
-/// Runs the whole experiment, which leaves what was measured in `samples` if it ends early. `progress` receives the stage, the samples taken in it, and
-/// their largest number.
+/// Runs the whole experiment, which leaves what was measured in `samples` if it ends early. `progress` receives the stage and the samples taken in it.
 pub fn run(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
     plan: &Plan,
-    mut progress: impl FnMut(Stage, usize, usize),
+    mut progress: impl FnMut(Stage, usize),
 ) -> Result<Record, ExperimentError> {
-    let mut report = |stage: Stage, taken| progress(stage, taken, stage.samples(plan));
-    let mut bench = ControlLoop::new(rig, controller, plan, &plan.lock, samples, &mut report)?;
+    let mut bench = ControlLoop::new(rig, controller, plan, &plan.lock, samples, &mut progress)?;
     conduct(&mut bench).map_err(|error| {
         bench.switch_off();
         bench.beside_what_was_asked(error)
@@ -221,8 +219,6 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     pub periods: f64,
     /// Latest output of the controller.
     pub last: Command,
-    /// Time limit for the lock, samples.
-    limit: usize,
     /// Receives the stage and the samples taken in it.
     progress: &'a mut dyn FnMut(Stage, usize),
     /// The present stage, and the samples before it.
@@ -259,7 +255,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             taken: 0,
             periods: 0.0,
             last: Command::default(),
-            limit: Stage::Locking.samples(plan),
             progress,
             stage: (Stage::Locking, 0),
             holds_response: false,
@@ -306,7 +301,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
             return Err(self.tripped(stage, &command));
         }
         (self.progress)(stage, self.taken - self.stage.1);
-        if stage == Stage::Locking && self.taken >= self.limit {
+        if stage == Stage::Locking && self.taken >= stage.samples(self.plan) {
             return Err(self.no_lock(&command));
         }
         Ok(())

@@ -436,7 +436,7 @@ fn recorded_on(rig: Parameters, settings: &str) -> Recording {
     let rig = rig.with_sensors(scene.resonance);
     let mut rig = Recorder { rig: Chain::around(Box::new(rig), &scene), read: Vec::new() };
     let mut controller = BuiltIn::new(&scene.plan().tracking).unwrap();
-    track(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _| {}).unwrap();
+    track(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_| {}).unwrap();
     let kept = &rig.read[3000..rig.read.len() - 500];
     Recording {
         origin: "record.csv".into(),
@@ -474,7 +474,7 @@ fn locked(scene: &Scene, cavity: Cavity) -> Recording {
     let rig = Simulated::new(Parameters { cavity, ..RIG }, scene.start).unwrap();
     let mut rig = Chain::around(Box::new(rig.with_sensors(scene.resonance)), scene);
     let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
-    let record = run(&mut Vec::new(), &mut *rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap();
+    let record = run(&mut Vec::new(), &mut *rig, &mut controller, &scene.plan(), |_, _| {}).unwrap();
     let sensors = || record.samples.iter().map(|one| one.sensors);
     Recording {
         sample_time: record.sample_time,

@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         experiment.start("vines backbone", Some(&arguments.rig), |plan| plan.tracking, &FILES)?;
     let bar = progress_bar(scene.backbone.points.into(), "tracking the backbone", "levels");
     let measured = session.measure(&scene, &plan, |samples, rig, controller| {
-        track(samples, rig, controller, &plan, |done, _| bar.set_position(done as u64))
+        track(samples, rig, controller, &plan, |done| bar.set_position(done as u64))
     });
     bar.finish_and_clear();
     let (tracked, ended) = measured?;

@@ -54,8 +54,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         experiment.start("vines identify", arguments.rig.as_ref(), |plan| plan.lock, &FILES)?;
     let bar = progress_bar(Stage::Locking.samples(&plan) as u64, "", "samples");
     let measured = session.measure(&scene, &plan, |samples, rig, controller| {
-        experiment::run(samples, rig, controller, &plan, |stage, done, of| {
-            show(&bar, stage, done, of)
+        experiment::run(samples, rig, controller, &plan, |stage, done| {
+            show(&bar, stage, done, stage.samples(&plan))
         })
     });
     bar.finish_and_clear();

@@ -115,7 +115,7 @@ fn renamed(fmu: &str, to: &Path, names: &[(&str, &str)]) {
 
 /// Detuning at which a run has locked.
 fn locked(rig: &mut dyn Rig, controller: &mut dyn Controller, scene: &Scene) -> Result<f64, ExperimentError> {
-    let record = experiment::run(&mut Vec::new(), rig, controller, &scene.plan(), |_, _, _| {})?;
+    let record = experiment::run(&mut Vec::new(), rig, controller, &scene.plan(), |_, _| {})?;
     Ok(identify(&record, &scene.plan()).unwrap().lock.at.sigma)
 }
 

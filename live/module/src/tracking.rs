@@ -82,7 +82,7 @@ pub fn track(scene: &Scene, rig: &NoisyRig, controller: BuiltIn, sample: u64) ->
         &mut rig.clone(),
         &mut controller,
         &scene.plan(),
-        |_, _| begun.push(last.get()),
+        |_| begun.push(last.get()),
     )?;
     let ends = begun.into_iter().skip(1).chain([last.get()]);
     let points = tracked.points.iter().zip(ends);

@@ -28,7 +28,7 @@ impl Controller for ConstantDrive {
 fn record_of(scene: &Scene) -> Record {
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let mut controller = ConstantDrive(BuiltIn::new(&scene.plan().lock).unwrap());
-    run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap()
+    run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _| {}).unwrap()
 }
 
 fn bench() -> Bench {

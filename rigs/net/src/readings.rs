@@ -273,7 +273,7 @@ mod tests {
                 };
                 let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
                 let mut rig = Chain::around(Box::new(rig), &scene);
-                experiment::run(&mut Vec::new(), &mut *rig, &mut controller, &scene.plan(), |_, _, _| {})
+                experiment::run(&mut Vec::new(), &mut *rig, &mut controller, &scene.plan(), |_, _| {})
                     .unwrap_or_else(|error| panic!("{settings:?}, {lost} samples from {from} on: {error}"))
             };
             let whole = run(u64::MAX / 2);

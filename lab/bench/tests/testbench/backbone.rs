@@ -13,7 +13,7 @@ use super::{Foreign, dimensionless};
 
 fn compared(rig: &mut dyn Rig, scene: &Scene, plan: &Plan) -> Result<TrackedComparison, ExperimentError> {
     let mut controller = BuiltIn::new(&plan.tracking).unwrap();
-    let tracked = track(&mut Vec::new(), rig, &mut controller, plan, |_, _| {})?;
+    let tracked = track(&mut Vec::new(), rig, &mut controller, plan, |_| {})?;
     Ok(TrackedComparison::of(&tracked, scene))
 }
 
@@ -159,7 +159,7 @@ fn a_curve_that_ends_on_a_rig_without_reported_impacts_is_a_result_though_the_co
         let plan = super::checked(&scene);
         let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
         let mut controller = BuiltIn::new(&plan.tracking).unwrap();
-        let tracked = track(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _| {}).unwrap();
+        let tracked = track(&mut Vec::new(), &mut rig, &mut controller, &plan, |_| {}).unwrap();
         assert!(tracked.ended.is_none(), "{r}, {snr} dB: {:?}", tracked.ended);
         let end = tracked.end.unwrap();
         let said =
@@ -224,7 +224,7 @@ fn a_controller_that_cannot_hold_the_response_is_refused() {
     let scene = dimensionless("");
     let mut constant = Foreign::new(&scene.plan().lock, |_: &mut _, _| Ok(()));
     let mut rig = Simulated::of(&scene).unwrap();
-    let error = track(&mut Vec::new(), &mut *rig, &mut constant, &scene.plan(), |_, _| {}).unwrap_err();
+    let error = track(&mut Vec::new(), &mut *rig, &mut constant, &scene.plan(), |_| {}).unwrap_err();
     let is_refused = matches!(error, ExperimentError::Controller(ControllerError::NoResponseLoop(_)));
     assert!(is_refused, "{error}");
 }

@@ -135,7 +135,7 @@ fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() 
         let mut rig = Altered { read: Box::new(read), ..Altered::driven(&scene, drive) };
         let answer = |command: &mut Command, (_, sample): Asked| if sample < 2000 { Ok(()) } else { breaks(command) };
         let mut controller = Foreign::new(&scene.plan().lock, answer);
-        let run = || experiment::run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+        let run = || experiment::run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _| {});
         let ended = catch_unwind(AssertUnwindSafe(run));
         assert_eq!(last.get(), 0.0);
         ended

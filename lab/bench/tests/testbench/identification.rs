@@ -17,7 +17,7 @@ use super::{Foreign, dimensionless, paper, record_of};
 fn ended(scene: &Scene) -> (ExperimentError, Vec<Sample>) {
     let (mut rig, mut samples) = (Simulated::of(scene).unwrap(), Vec::new());
     let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
-    let record = experiment::run(&mut samples, &mut *rig, &mut controller, &scene.plan(), |_, _, _| {});
+    let record = experiment::run(&mut samples, &mut *rig, &mut controller, &scene.plan(), |_, _| {});
     (record.unwrap_err(), samples)
 }
 
@@ -33,7 +33,7 @@ fn identified_by(
     scene: &Scene,
     plan: &Plan,
 ) -> Result<Comparison, IdentificationError> {
-    let record = experiment::run(&mut Vec::new(), rig, controller, plan, |_, _, _| {}).unwrap();
+    let record = experiment::run(&mut Vec::new(), rig, controller, plan, |_, _| {}).unwrap();
     Ok(Comparison::of(&identify(&record, plan)?, scene))
 }
 

@@ -154,7 +154,7 @@ fn foreign(
         change(command, asked);
         Ok(())
     });
-    let record = run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+    let record = run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _| {});
     drop(rig);
     (record, last, largest)
 }
@@ -162,7 +162,7 @@ fn foreign(
 /// The record of an experiment.
 fn record(rig: &mut dyn Rig, scene: &Scene) -> Result<Record, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
-    run(&mut Vec::new(), rig, &mut controller, &scene.plan(), |_, _, _| {})
+    run(&mut Vec::new(), rig, &mut controller, &scene.plan(), |_, _| {})
 }
 
 /// The record of the rig of a scene.
@@ -178,7 +178,7 @@ fn identified(scene: &Scene) -> Result<Identification, IdentificationError> {
 /// The tracked backbone.
 fn tracked(rig: &mut dyn Rig, scene: &Scene) -> Result<Tracked, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.plan().tracking).unwrap();
-    track(&mut Vec::new(), rig, &mut controller, &checked(scene), |_, _| {})
+    track(&mut Vec::new(), rig, &mut controller, &checked(scene), |_| {})
 }
 
 /// The tracked backbone of the rig of a scene.

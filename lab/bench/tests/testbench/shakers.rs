@@ -340,7 +340,7 @@ fn distance_of_checked_lock(chain: &str) -> [f64; 2] {
     let linear = check(&mut rig, &scene.plan()).unwrap().linear.unwrap();
     let plan = scene.plan_on(scene.knowledge().measured(linear.response));
     let mut controller = BuiltIn::new(&plan.lock).unwrap();
-    let record = run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
+    let record = run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _| {}).unwrap();
     let compared = Comparison::of(&identify(&record, &plan).unwrap(), &scene);
     let (at, exact) = (compared.lock.at, compared.exact.unwrap());
     assert!(compared.lock.at_requested_drive, "{at:?}");
@@ -372,7 +372,7 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
         &mut SensorsOnly::around(rig),
         &mut controller,
         &plan,
-        |_, _| {},
+        |_| {},
     );
     let is_limit = |error: &ExperimentError| {
         matches!(error, ExperimentError::Rig(RigError::ShakerLimit { name: "force", .. }))
@@ -450,7 +450,7 @@ fn the_bench_plans_within_the_limits_of_a_shaker() {
         let plan = Plan { decay: 0, ..scene.plan() };
         let mut controller = BuiltIn::new(&plan.lock).unwrap();
         let mut rig = Measured::new(rig, scene.resonance, &scene.plant, 0.0);
-        run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
+        run(&mut Vec::new(), &mut rig, &mut controller, &plan, |_, _| {}).unwrap();
         for ((name, key), needed) in LIMITED.into_iter().zip(largest.get()) {
             for times in [1.6, 1.9, 2.2] {
                 let limited = text.replace("[shaker]", &format!("[shaker]\n{key} = {:?}", times * needed));
@@ -487,7 +487,7 @@ fn excessive(scene: &Scene, amplitude: f64) -> Result<Record, ExperimentError> {
     };
     let mut controller = Foreign::new(&plan.lock, answer);
     let mut rig = Simulated::of(scene).unwrap();
-    run(&mut Vec::new(), &mut *rig, &mut controller, &plan, |_, _, _| {})
+    run(&mut Vec::new(), &mut *rig, &mut controller, &plan, |_, _| {})
 }
 
 #[test]

@@ -101,7 +101,7 @@ fn run(scene: &Scene, change: impl FnMut(&mut Command, Option<usize>)) -> (Resul
     let limits = Config { response_max: None, ..scene.plan().lock };
     let mut controller = Changed(BuiltIn::new(&limits).unwrap(), 0, change);
     let mut rig = logged(scene, false, &log);
-    let record = experiment::run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _, _| {});
+    let record = experiment::run(&mut Vec::new(), &mut rig, &mut controller, &scene.plan(), |_, _| {});
     drop(rig);
     (record, log.into_inner())
 }
@@ -222,7 +222,7 @@ fn responses_that_a_search_or_a_track_states_are_displacements_at_the_sensor() {
     for silent in [false, true] {
         let (error, _) = ended(&frame(settings), silent, |rig, scene| {
             let mut controller = BuiltIn::new(&scene.plan().tracking).unwrap();
-            let tracked = track(&mut Vec::new(), rig, &mut controller, &super::checked(scene), |_, _| {});
+            let tracked = track(&mut Vec::new(), rig, &mut controller, &super::checked(scene), |_| {});
             tracked.unwrap().end.map_or(Ok(()), |end| Err(end.to_string()))
         });
         assert_states(&error, &[(0.45 * b, "m"), (0.3 * b, "m")]);

@@ -79,7 +79,7 @@ fn lock(device: Option<(f64, Fate)>) -> (Lock, Counters) {
     let (mut plant, step) = (Simulated::new(scene.plant, scene.start).unwrap(), scene.sample_time());
     let measure = |rig: &mut dyn Rig| {
         let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
-        let record = experiment::run(&mut Vec::new(), rig, &mut controller, &scene.plan(), |_, _, _| {}).unwrap();
+        let record = experiment::run(&mut Vec::new(), rig, &mut controller, &scene.plan(), |_, _| {}).unwrap();
         identify(&record, &scene.plan()).unwrap().lock
     };
     let Some((samples, fate)) = device else {

@@ -28,7 +28,7 @@ fn an_experiment_with_held_samples_across_the_network_gives_the_same_bits() {
     scene.record.decay_periods = Some(150.0);
     let measure = |rig: Box<dyn Rig>, controller: &mut dyn Controller| {
         let mut rig = Chain::around(rig, &scene);
-        experiment::run(&mut Vec::new(), rig.as_mut(), controller, &scene.plan(), |_, _, _| {}).unwrap()
+        experiment::run(&mut Vec::new(), rig.as_mut(), controller, &scene.plan(), |_, _| {}).unwrap()
     };
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
     let direct = measure(Box::new(plant), &mut BuiltIn::new(&scene.plan().lock).unwrap());
