@@ -475,11 +475,8 @@ impl Structure {
     /// The displacements of all coordinates of a structure with a shaker, by the sections.
     pub fn coordinates_with_shaker(&self) -> Result<Vec<Row>, String> {
         let n = self.modes.len() + rows_beyond(self.excitation);
-        let coordinate = |place: usize| {
-            let of_coordinate: Vec<f64> = (0..n).map(|other| f64::from(u8::from(other == place))).collect();
-            self.host.row(&of_coordinate).map_err(|error| error.to_string())
-        };
-        (0..n).map(coordinate).collect()
+        let coordinate = |place: usize| (0..n).map(|other| f64::from(u8::from(other == place))).collect();
+        rows(&self.host, &(0..n).map(coordinate).collect::<Vec<_>>())
     }
 }
 
