@@ -5,6 +5,7 @@ use std::io;
 
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
+use vines::FileError;
 use vines::cells::CellError;
 use vines::experiment::ExperimentError;
 use vines::fmu::{FmuError, Obstacle};
@@ -13,9 +14,8 @@ use vines::net::{Address, LinkError};
 use vines::orbit::NoMotion;
 use vines::pack::PackError;
 use vines::report::ReportError;
-use vines::rig::{ControllerError, Interrupted, RigError};
+use vines::rig::{Interrupted, RigError};
 use vines::scene::{SceneError, refusal};
-use vines::{ArgumentError, FileError};
 
 /// Exit code of an experiment that a signal ended; that of the program is of the signal ([`super::signals`]).
 pub(super) const INTERRUPTED: u8 = 130;
@@ -63,8 +63,8 @@ macro_rules! exit_codes {
 }
 
 exit_codes! {
-    2: ArgumentError, CellError, InvalidValue, SceneError;
-    1: io::Error, ControllerError, FileError, NoMotion, ReportError, RigError;
+    2: CellError, InvalidValue, SceneError;
+    1: io::Error, FileError, NoMotion, ReportError, RigError;
 }
 
 impl From<FmuError> for Failure {

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use lovines::InvalidValue;
 use phase_lock::{ConfigError, Number};
-use vines_model::ArgumentError;
 
 use super::refusal;
 
@@ -14,8 +13,6 @@ use super::refusal;
 pub enum SceneError {
     #[error("cannot read the scene {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("--set: {0}")]
-    Argument(#[from] ArgumentError),
     #[error("--set {argument}: {message}")]
     Override { argument: String, message: String },
     #[error("{key} = {} {unit}: {allowed}", Number(*value))]
