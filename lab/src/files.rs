@@ -93,7 +93,7 @@ const PREVIOUS: &str = "previous";
 pub struct ResultFolder {
     path: PathBuf,
     /// What the command may write.
-    names: &'static [&'static str],
+    names: Vec<&'static str>,
     /// Removes the lock's file, and the folders that were created, if they are empty.
     _cleanup: Cleanup,
     /// Holds the lock, if the file system has locks.
@@ -105,7 +105,7 @@ impl ResultFolder {
     ///
     /// # Errors
     /// A folder that another run holds, or that cannot be written to; a file that cannot be replaced.
-    pub fn open(path: &Path, names: &'static [&'static str]) -> Result<Self, FileError> {
+    pub fn open(path: &Path, names: &[&'static str]) -> Result<Self, FileError> {
         // Absolute: an FMU may change the working folder.
         let absolute = std::path::absolute(path).map_err(FileError::at(path))?;
         // The deepest first.
@@ -121,8 +121,9 @@ impl ResultFolder {
                 let _ = fs::remove_dir(folder);
             }
         });
+        let names = names.into();
         let folder = Self { path: path.into(), names, _cleanup, _lock };
-        for name in names {
+        for name in &folder.names {
             writable(&path.join(name))?;
         }
         Ok(folder)
@@ -140,7 +141,7 @@ impl ResultFolder {
             file.write_all(content.as_ref()).map_err(FileError::at(&path))?;
             finished.push((file, path));
         }
-        for name in self.names {
+        for name in &self.names {
             let path = self.path.join(name);
             absent(fs::remove_file(&path)).map_err(FileError::at(&path))?;
         }

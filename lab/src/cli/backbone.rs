@@ -46,7 +46,7 @@ pub(super) struct Arguments {
 }
 
 /// Results that are written.
-const FILES: [&str; 4] = ["tracked.json", "tracked.csv", "tracked.svg", INTERRUPTED_FILE];
+pub(super) const FILES: [&str; 4] = ["tracked.json", "tracked.csv", "tracked.svg", INTERRUPTED_FILE];
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let experiment = &arguments.experiment;

@@ -94,7 +94,7 @@ impl ExperimentArguments {
         command: &str,
         rig: Option<&Endpoint>,
         config: impl Fn(&Plan) -> Config,
-        names: &'static [&'static str],
+        names: &[&'static str],
     ) -> Result<(Scene, Plan, Session), Failure> {
         let scene = self.scene.load()?;
         let watch = self.watch.start(command, &scene)?;

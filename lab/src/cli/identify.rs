@@ -39,7 +39,7 @@ pub(super) struct Arguments {
 }
 
 /// Results that are written.
-const FILES: [&str; 6] = [
+pub(super) const FILES: [&str; 6] = [
     "identification.json",
     "backbone.csv",
     "backbone.svg",

@@ -144,7 +144,7 @@ pub(super) fn writable<'a>(files: impl IntoIterator<Item = &'a PathBuf>) -> Resu
 }
 
 /// Opens the folder of results before anything runs; `names` are the files that the command may write.
-pub(super) fn results(folder: &Path, names: &'static [&'static str]) -> Result<ResultFolder, Failure> {
+pub(super) fn results(folder: &Path, names: &[&'static str]) -> Result<ResultFolder, Failure> {
     ResultFolder::open(folder, names).map_err(|error| {
         let advice = match error.source.kind() {
             io::ErrorKind::ResourceBusy => "; wait for its end, or choose another folder with --out",

@@ -10,12 +10,10 @@ use vines::regime_map::{Axis, Map};
 use vines::rig::BuiltIn;
 use vines::scene::Scene;
 
-use super::experiment::INTERRUPTED_FILE;
 use super::output::{results, written};
 use super::shell::quoted;
 use super::summary::{ideal, parameters};
-use super::{Cli, dispatch};
-use super::{failure::Failure, options::SceneArguments, signals};
+use super::{Cli, backbone, dispatch, failure::Failure, identify, map, options::SceneArguments, signals};
 
 const HELP: &str = "\
 Runs `vines identify`, `backbone`, `theory`, `orbit --response`, `map` and `fit` on one scene, and writes report.html beside their files:
@@ -98,26 +96,6 @@ const STRUCTURE_SECTION: Section = (
     &["structure.svg"],
 );
 
-/// What is written.
-const FILES: [&str; 16] = [
-    "report.html",
-    "identification.json",
-    "backbone.csv",
-    "backbone.svg",
-    "history.svg",
-    "sim.svg",
-    "tracked.json",
-    "tracked.csv",
-    "tracked.svg",
-    "response.svg",
-    "structure.svg",
-    "map.csv",
-    "map.svg",
-    "bifurcations.csv",
-    "fit.svg",
-    INTERRUPTED_FILE,
-];
-
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     // Invalid settings are refused before anything runs or is written.
     let scene = arguments.scene.load()?;
@@ -126,7 +104,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         Map::new(arguments.scene.family()?, &arguments.x, &arguments.y, None, LIMIT)?;
     }
     BuiltIn::new(&scene.plan().lock)?;
-    let folder = results(&arguments.out, &FILES)?;
+    let of_commands = [&identify::FILES[..], &backbone::FILES, &map::FILES].concat();
+    let own = ["report.html", "response.svg", "structure.svg", "fit.svg"];
+    let folder = results(&arguments.out, &[&own[..], &of_commands].concat())?;
     // The files of all commands are put in place together.
     let new = TemporaryFolder::new(tempfile::Builder::new().prefix(".vines-").tempdir_in(&arguments.out)?);
     let mut failed = Vec::new();
