@@ -86,10 +86,3 @@ impl RigError {
         self.source()?.downcast_ref()
     }
 }
-
-impl ControllerError {
-    /// The error of the implementation, if it is an `E`.
-    pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
-        self.source()?.downcast_ref()
-    }
-}

@@ -8,7 +8,7 @@ use std::time::Duration;
 use vines_bench::rig::{Command, Controller, LoopState, Move, Sensors};
 use vines_net::{Ended, LinkError};
 
-use crate::{Answers, PATIENT, SCENE, Served, drive, serve_built_in, serve_controller};
+use crate::{Answers, PATIENT, SCENE, Served, drive, link_error, serve_built_in, serve_controller};
 
 fn reading(n: usize) -> Sensors {
     Sensors { response: n as f64, reference: None }
@@ -69,7 +69,7 @@ fn a_controller_that_stops_answering_is_a_permanent_error_and_a_client_that_was_
         let (server, _) = serve_echo(&done);
         let mut peer = server.controller(pace);
         let error = (0..).find_map(|n| peer.sample(reading(n), true).err()).unwrap();
-        assert!(matches!(error.cause(), Some(LinkError::Silent { .. })), "{error}");
+        assert!(matches!(link_error(&error), LinkError::Silent { .. }), "{error}");
         assert!(peer.sample(reading(0), true).is_err());
         done.store(usize::MAX, Ordering::Relaxed);
     }
@@ -78,7 +78,7 @@ fn a_controller_that_stops_answering_is_a_permanent_error_and_a_client_that_was_
     peer.sample(reading(0), true).unwrap();
     assert_eq!(server.session().ended, Ended::Silence);
     let error = peer.sample(reading(1), true).unwrap_err();
-    assert!(matches!(error.cause(), Some(LinkError::Closed { .. })), "{error}");
+    assert!(matches!(link_error(&error), LinkError::Closed { .. }), "{error}");
 }
 
 #[test]

@@ -140,7 +140,8 @@ fn shake(rig: &mut dyn Rig, samples: usize) -> Result<(), RigError> {
     })
 }
 
-/// The error of the connection in the error of a rig.
-fn link_error(error: &RigError) -> &LinkError {
-    error.cause().unwrap_or_else(|| panic!("{error}"))
+/// The error of the connection in the error of a rig or a controller.
+fn link_error(error: &dyn std::error::Error) -> &LinkError {
+    let cause = error.source().and_then(|cause| cause.downcast_ref());
+    cause.unwrap_or_else(|| panic!("{error}"))
 }
