@@ -229,9 +229,6 @@ pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     driven: bool,
 }
 
-/// A period of the drive in a record: its first sample, and the phase of the drive there, turns.
-pub(crate) type Period = (usize, f64);
-
 impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     /// Before the first sample.
     pub fn new(
@@ -342,12 +339,20 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     }
 
     /// Samples to the end of the present period of the drive.
-    pub fn period(&mut self, stage: Stage) -> Result<Period, ExperimentError> {
-        let begin = (self.samples.len(), self.periods);
-        while self.periods < begin.1.floor() + 1.0 {
+    pub fn period(&mut self, stage: Stage) -> Result<(), ExperimentError> {
+        let end = self.periods.floor() + 1.0;
+        while self.periods < end {
             self.sample(stage)?;
         }
-        Ok(begin)
+        Ok(())
+    }
+
+    /// The fit of these samples; `None` without a motion.
+    pub fn cycle(&mut self, stage: Stage) -> Result<Option<Cycle>, ExperimentError> {
+        let (begin, phase) = (self.samples.len(), self.periods * TAU);
+        self.period(stage)?;
+        let target = self.plan.knowledge.target;
+        Ok(Cycle::of(&self.samples[begin..], self.sample_time, phase, target))
     }
 
     /// Controls the amplitude of the response; the move is one of its displacement.
@@ -368,11 +373,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     pub fn hold_drive(&mut self) -> Result<(), ControllerError> {
         self.holds_response = false;
         self.controller.hold_drive()
-    }
-
-    /// The fit of the samples since the beginning of the last period; `None` without a motion.
-    pub fn cycle(&self, (begin, turns): Period, target: Target) -> Option<Cycle> {
-        Cycle::of(&self.samples[begin..], self.sample_time, turns * TAU, target)
     }
 
     /// Follows the controller's ramp after a fault until the drive is off.

@@ -269,10 +269,10 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
     let knowledge = &plan.knowledge;
     let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
-    let held = Cycle::all(hold, dt, knowledge.target);
+    let held = Cycle::all(hold, dt, 0.0, knowledge.target);
     let most = knowledge.samples(MOST_EVALUATED).max(hold.len());
     let last = &record.samples[record.hold_end.saturating_sub(most)..record.hold_end];
-    let cycles = Cycle::all(last, dt, knowledge.target);
+    let cycles = Cycle::all(last, dt, 0.0, knowledge.target);
     let approach = approached(&cycles, &held);
     let largest = mean(held.iter().map(Cycle::amplitude));
     // The balances say which drive and frequency belong to a response, whether it rests or not.

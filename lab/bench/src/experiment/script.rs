@@ -234,10 +234,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     fn begin(&mut self) -> Result<Leg, ExperimentError> {
         let mut near = 0;
         while near < CONFIRMED {
-            let period = self.run.period(self.stage)?;
+            let cycle = self.run.cycle(self.stage)?;
             let state = self.run.last.state;
             let closed = state.is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
-            let is_near = self.run.cycle(period, self.knowledge.target).is_some_and(|cycle| {
+            let is_near = cycle.is_some_and(|cycle| {
                 self.setpoint = cycle.amplitude();
                 cycle.phase_error.abs() < CONTROL_PHASE_ERROR
             });
@@ -387,8 +387,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// One period of the drive.
     pub fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
         loop {
-            let period = self.run.period(self.stage)?;
-            if let Some(cycle) = self.run.cycle(period, self.knowledge.target) {
+            if let Some(cycle) = self.run.cycle(self.stage)? {
                 return Ok(cycle);
             }
         }
@@ -541,23 +540,15 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
 
     /// Measures over `periods`, without foreign tones, which disturb so few periods.
     fn measure(&mut self, periods: usize, is_at_rest: bool) -> Result<Leg, ExperimentError> {
-        let mut begins = Vec::new();
-        while begins.len() < periods.max(ResonanceFit::FEWEST) {
-            begins.push(self.run.period(self.stage)?);
+        let (begin, turns) = (self.run.samples.len(), self.run.periods);
+        for _ in 0..periods.max(ResonanceFit::FEWEST) {
+            self.run.period(self.stage)?;
         }
-        let raw = &self.run.samples[begins[0].0..];
+        let raw = &self.run.samples[begin..];
         let omega = mean(raw.iter().map(|sample| sample.command.drive.omega));
         let cleaned = without_tones(raw, self.knowledge, omega);
         let samples = cleaned.as_deref().unwrap_or(raw);
-        let ends = begins[1..].iter().map(|next| next.0).chain([self.run.samples.len()]);
-        let cycles: Vec<Cycle> = begins
-            .iter()
-            .zip(ends)
-            .filter_map(|(&(begin, turns), end)| {
-                let period = &samples[begin - begins[0].0..end - begins[0].0];
-                Cycle::of(period, self.run.sample_time, turns * TAU, self.knowledge.target)
-            })
-            .collect();
+        let cycles = Cycle::all(samples, self.run.sample_time, turns, self.knowledge.target);
         let Some(fit) = ResonanceFit::of(&cycles, self.knowledge, None, false) else {
             return self.measure(periods, is_at_rest);
         };

@@ -158,9 +158,9 @@ impl Cycle {
         })
     }
 
-    /// The complete periods of the drive in these samples, in order.
-    pub fn all(samples: &[Sample], sample_time: f64, target: Target) -> Vec<Self> {
-        let (mut cycles, mut begin, mut turns, mut phase) = (Vec::new(), 0, 0.0, 0.0);
+    /// The complete periods of the drive in these samples, in order; `start`: phase of the drive at the first sample, turns.
+    pub fn all(samples: &[Sample], sample_time: f64, start: f64, target: Target) -> Vec<Self> {
+        let (mut cycles, mut begin, mut turns, mut phase) = (Vec::new(), 0, start, start);
         for (n, sample) in samples.iter().enumerate() {
             turns += sample.command.drive.omega * sample_time / TAU;
             if turns >= f64::floor(phase) + 1.0 {

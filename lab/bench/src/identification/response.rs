@@ -235,6 +235,7 @@ pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64)
     let cycles = Cycle::all(
         cleaned.as_deref().unwrap_or(samples),
         knowledge.sample_time,
+        0.0,
         knowledge.target,
     );
     let trend = HarmonicBasis::new(&vec![0.0; cycles.len()], 2, &[]);
