@@ -41,12 +41,7 @@ pub fn runs_away(samples: &[Sample], plan: &Plan) -> bool {
     let Some(begin) = samples.len().checked_sub(plan.hold) else {
         return false;
     };
-    let cycle = Cycle::of(
-        &samples[begin..],
-        plan.knowledge.sample_time,
-        0.0,
-        plan.knowledge.target,
-    );
+    let cycle = Cycle::of(&samples[begin..], 0.0, &plan.knowledge);
     let first = samples.iter().find(|sample| sample.command.drive.amplitude > 0.0);
     cycle.zip(first).is_some_and(|(cycle, first)| {
         let moved = cycle.omega - first.command.drive.omega;

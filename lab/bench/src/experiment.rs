@@ -351,8 +351,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     pub fn cycle(&mut self, stage: Stage) -> Result<Option<Cycle>, ExperimentError> {
         let (begin, phase) = (self.samples.len(), self.periods * TAU);
         self.period(stage)?;
-        let target = self.plan.knowledge.target;
-        Ok(Cycle::of(&self.samples[begin..], self.sample_time, phase, target))
+        Ok(Cycle::of(&self.samples[begin..], phase, &self.plan.knowledge))
     }
 
     /// Controls the amplitude of the response; the move is one of its displacement.

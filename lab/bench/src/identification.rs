@@ -21,8 +21,8 @@ use vines_scene::scene::{Measurand, Units};
 
 pub(crate) use asked::{SAME, departure, is_another};
 pub(crate) use cycle::Cycle;
+pub(crate) use decay::{DECAY_TERMS, PER_PERIOD, base_at_rest, harmonic};
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
-pub(crate) use decay::{PER_PERIOD, base_at_rest, harmonic};
 pub(crate) use level::{Criterion, LevelEstimate, Unsteady};
 pub(crate) use level::{LONGEST_SETTLING, is_off_target};
 pub(crate) use resonance_fit::ResonanceFit;
@@ -269,10 +269,10 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
     let knowledge = &plan.knowledge;
     let d = &knowledge.numbers;
     let (dt, hold) = (record.sample_time, record.hold());
-    let held = Cycle::all(hold, dt, 0.0, knowledge.target);
+    let held = Cycle::all(hold, 0.0, knowledge);
     let most = knowledge.samples(MOST_EVALUATED).max(hold.len());
     let last = &record.samples[record.hold_end.saturating_sub(most)..record.hold_end];
-    let cycles = Cycle::all(last, dt, 0.0, knowledge.target);
+    let cycles = Cycle::all(last, 0.0, knowledge);
     let approach = approached(&cycles, &held);
     let largest = mean(held.iter().map(Cycle::amplitude));
     // The balances say which drive and frequency belong to a response, whether it rests or not.

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use vines_model::regime::{Impact, MEASURED, Regime, end_of_synchrony, one_to_one};
 
-use crate::identification::{DECAY_WINDOW, PER_PERIOD, harmonic};
+use crate::identification::{DECAY_TERMS, DECAY_WINDOW, PER_PERIOD, harmonic};
 use vines_scene::plan::DECAYED;
 
 /// Impacts that are kept to determine the regime from.
@@ -104,7 +104,7 @@ impl Decay {
         if self.values.len() < self.window {
             return;
         }
-        match harmonic(&self.values, sample_time, self.motion.omega) {
+        match harmonic(&self.values, sample_time, self.motion.omega, DECAY_TERMS) {
             Some(fit) => {
                 self.ended = fit.amplitude < DECAYED * *self.first.get_or_insert(fit.amplitude);
                 self.motion = HarmonicMotion {

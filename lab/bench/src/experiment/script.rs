@@ -548,7 +548,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let omega = mean(raw.iter().map(|sample| sample.command.drive.omega));
         let cleaned = without_tones(raw, self.knowledge, omega);
         let samples = cleaned.as_deref().unwrap_or(raw);
-        let cycles = Cycle::all(samples, self.run.sample_time, turns, self.knowledge.target);
+        let cycles = Cycle::all(samples, turns, self.knowledge);
         let Some(fit) = ResonanceFit::of(&cycles, self.knowledge, None, false) else {
             return self.measure(periods, is_at_rest);
         };

@@ -19,7 +19,7 @@ pub(crate) fn is_another(difference: f64, u: f64, requested: f64) -> bool {
 /// moving is no departure, but on its way. `None` if phase and drive are as asked, or cannot be measured.
 pub(crate) fn departure(samples: &[Sample], plan: &Plan) -> Option<String> {
     let knowledge = &plan.knowledge;
-    let cycles = Cycle::all(samples, knowledge.sample_time, 0.0, knowledge.target);
+    let cycles = Cycle::all(samples, 0.0, knowledge);
     if cycles.len() < ResonanceFit::FEWEST {
         return None;
     }

@@ -7,7 +7,7 @@ use vines_model::numerics::{HarmonicBasis, mean};
 
 use super::harmonics_of;
 use crate::record::{Sample, drive_phases};
-use vines_scene::knowledge::Target;
+use vines_scene::knowledge::Knowledge;
 use vines_scene::scene::Measurand;
 
 /// Harmonics of the sensor signals over one period of the drive.
@@ -68,9 +68,9 @@ impl Bases {
 }
 
 impl Cycle {
-    /// The samples of one period; `phase` (rad): phase of the drive at the first, `target`: phase target of the response relative to the base, and
-    /// what both channels measure. `None` for too few samples.
-    pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: Target) -> Option<Self> {
+    /// The samples of one period; `phase` (rad): phase of the drive at the first. `None` for too few samples.
+    pub fn of(samples: &[Sample], phase: f64, knowledge: &Knowledge) -> Option<Self> {
+        let Knowledge { sample_time, target, .. } = *knowledge;
         // Offset, sine and cosine of the harmonics, and the drift of the first.
         if samples.len() <= 2 * HARMONICS + 3 {
             return None;
@@ -159,12 +159,12 @@ impl Cycle {
     }
 
     /// The complete periods of the drive in these samples, in order; `start`: phase of the drive at the first sample, turns.
-    pub fn all(samples: &[Sample], sample_time: f64, start: f64, target: Target) -> Vec<Self> {
+    pub fn all(samples: &[Sample], start: f64, knowledge: &Knowledge) -> Vec<Self> {
         let (mut cycles, mut begin, mut turns, mut phase) = (Vec::new(), 0, start, start);
         for (n, sample) in samples.iter().enumerate() {
-            turns += sample.command.drive.omega * sample_time / TAU;
+            turns += sample.command.drive.omega * knowledge.sample_time / TAU;
             if turns >= f64::floor(phase) + 1.0 {
-                cycles.extend(Self::of(&samples[begin..=n], sample_time, phase * TAU, target));
+                cycles.extend(Self::of(&samples[begin..=n], phase * TAU, knowledge));
                 (begin, phase) = (n + 1, turns);
             }
         }

@@ -242,7 +242,7 @@ fn fitted(values: &[f64], [dt, periods]: [f64; 2], mut omega: f64, terms: Terms)
     let step = ((period / PER_PERIOD).round() as usize).max(1);
     let fits = values.windows(window).enumerate().step_by(step);
     fits.map_while(|(n, values)| {
-        let fit = harmonic_of(values, dt, omega, terms)?;
+        let fit = harmonic(values, dt, omega, terms)?;
         omega = fit.omega;
         let time = (n as f64 + 0.5 * (window - 1) as f64) * dt;
         Some(SlidingFit { samples: n..n + window, time, fit })
@@ -254,7 +254,7 @@ fn fitted(values: &[f64], [dt, periods]: [f64; 2], mut omega: f64, terms: Terms)
 
 /// A harmonic fitted to a window of samples; everything holds at the middle of the window.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Harmonic {
+pub(crate) struct Harmonic {
     /// Amplitude of the fundamental, in the unit of the samples.
     pub amplitude: f64,
     /// Angular frequency, rad/s.
@@ -281,7 +281,7 @@ impl Harmonic {
 
 /// What is fitted to a window.
 #[derive(Debug, Clone, Copy)]
-struct Terms {
+pub(crate) struct Terms {
     /// Degree of the trend.
     trend: usize,
     /// Degrees of the harmonics.
@@ -296,7 +296,7 @@ struct Terms {
 }
 
 /// A constant, and harmonics 1 and 3 with drift.
-const DECAY_TERMS: Terms = Terms {
+pub(crate) const DECAY_TERMS: Terms = Terms {
     trend: 0,
     harmonics: &[Some(2), None, Some(1)],
     is_hann: false,
@@ -313,16 +313,11 @@ const BEHIND_SHAKER: Terms = Terms {
     lobe: 3.0,
 };
 
-/// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
-/// with linear drift, and a constant.
+/// Fits these terms to `values`, sampled every `sample_time` seconds: a fundamental near `omega` (rad/s) and its harmonics, with their drift, and a trend.
 ///
 /// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
 /// short or contains no motion of about that frequency.
-pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
-    harmonic_of(values, sample_time, omega, DECAY_TERMS)
-}
-
-fn harmonic_of(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Option<Harmonic> {
+pub(crate) fn harmonic(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Option<Harmonic> {
     let middle = 0.5 * (values.len() - 1) as f64;
     let count = values.len() as f64;
     // Their squares are Hann's window, whose mean is a half.
@@ -396,11 +391,11 @@ mod tests {
                 let theta = phase + t;
                 amplitude * (1.0 - decay * t) * theta.sin() + 0.02 * (3.0 * theta + 0.3).sin() + 0.01
             }).collect();
-            let fit = harmonic(&values, dt, guess).unwrap();
+            let fit = harmonic(&values, dt, guess, DECAY_TERMS).unwrap();
             prop_assert!((fit.omega - 1.0).abs() < 1e-9, "{fit:?}");
             prop_assert!((fit.amplitude - amplitude).abs() < 1e-9);
             // Silence has no harmonic.
-            prop_assert_eq!(harmonic(&[0.0; 100], dt, guess), None);
+            prop_assert_eq!(harmonic(&[0.0; 100], dt, guess, DECAY_TERMS), None);
         }
 
         #[test]
@@ -412,7 +407,7 @@ mod tests {
                 let t = (f64::from(i) - 149.5) * dt;
                 (1.0 - 0.01 * t) * t.sin() + 0.01 * (-0.04 * t).exp() * (ratio * t + phase).sin()
             }).collect();
-            let error = |terms: Terms| (harmonic_of(&values, dt, 1.0, terms).unwrap().omega - 1.0).abs();
+            let error = |terms: Terms| (harmonic(&values, dt, 1.0, terms).unwrap().omega - 1.0).abs();
             let bare = error(Terms { is_hann: false, ..BEHIND_SHAKER });
             prop_assert!(error(BEHIND_SHAKER) < 2e-6, "{:e}, without Hann's window {bare:e}", error(BEHIND_SHAKER));
         }
@@ -433,7 +428,7 @@ mod tests {
         };
         let pulls = (0..60).map(|_| {
             let values: Vec<f64> = (0..300).map(|i| (f64::from(i) * dt).sin() + noise * normal()).collect();
-            let fit = harmonic_of(&values, dt, 1.0, BEHIND_SHAKER).unwrap();
+            let fit = harmonic(&values, dt, 1.0, BEHIND_SHAKER).unwrap();
             (fit.omega - 1.0) / fit.uncertainties[1]
         });
         // The mean square of 60 normal values has a standard deviation of 0.18.

@@ -16,7 +16,7 @@ use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use super::{Cycle, harmonics_of};
 use crate::record::Sample;
-use vines_scene::knowledge::{Knowledge, Target};
+use vines_scene::knowledge::Knowledge;
 use vines_scene::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
 use vines_scene::scene::{Definition, Dimensionless, Measurand, Sensor};
 
@@ -95,27 +95,26 @@ impl Content {
         (channel, measurand): (usize, Measurand),
         is_moving: bool,
     ) -> Option<Self> {
-        let (sample_time, d) = (knowledge.sample_time, knowledge.numbers);
         let reading = |sample: &Sample| match channel {
             0 => sample.sensors.response,
             _ => sample.sensors.reference.unwrap_or(f64::NAN),
         };
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
-        let (n, turn) = (samples.len(), omega * sample_time);
+        let (n, turn) = (samples.len(), omega * knowledge.sample_time);
         let mut values = DVector::from_iterator(n, samples.iter().map(reading));
         let count = harmonics_of(measurand, TAU / turn, RESPONSE_HARMONICS);
         let of_all = basis(n, turn, count);
         if n < 2 * of_all.terms() {
             return None;
         }
-        let fitted = |values: &DVector<f64>| Self::fitted(&of_all, values, [omega, sample_time], &knowledge.target);
+        let fitted = |values: &DVector<f64>| Self::fitted(&of_all, values, omega, knowledge);
         let (mut content, mut rest) = fitted(&values)?;
         let mut lines: Vec<Line> = Vec::new();
         // Tones and harmonics are fitted in turn: what a tone has in common with the harmonics remains in the residual.
         while channel == 0 && content.is_irregular() && lines.len() < LINES {
             let line = Line::strongest(rest.as_slice());
             let is_known = |known: &Line| (known.turn - line.turn).abs() < TAU / n as f64;
-            if !line.is_foreign(&d, sample_time) && !lines.iter().any(is_known) {
+            if !line.is_foreign(knowledge) && !lines.iter().any(is_known) {
                 break;
             }
             values -= DVector::from_fn(n, |n, _| line.at(n));
@@ -153,9 +152,10 @@ impl Content {
     fn fitted(
         basis: &HarmonicBasis,
         values: &DVector<f64>,
-        [omega, sample_time]: [f64; 2],
-        target: &Target,
+        omega: f64,
+        knowledge: &Knowledge,
     ) -> Option<(Self, DVector<f64>)> {
+        let Knowledge { sample_time, target, .. } = *knowledge;
         let n = values.len();
         let fit = basis.fit(values)?;
         let rest = basis.residual(values, &fit);
@@ -232,12 +232,7 @@ const LONGEST_CYCLE: usize = 4;
 /// `(1 + P/Q)^-(n-4)`. The samples that differ from their harmonics within a period are noise at least.
 pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<usize> {
     let cleaned = without_tones(samples, knowledge, omega);
-    let cycles = Cycle::all(
-        cleaned.as_deref().unwrap_or(samples),
-        knowledge.sample_time,
-        0.0,
-        knowledge.target,
-    );
+    let cycles = Cycle::all(cleaned.as_deref().unwrap_or(samples), 0.0, knowledge);
     let trend = HarmonicBasis::new(&vec![0.0; cycles.len()], 2, &[]);
     let sum: Complex64 = cycles.iter().map(|cycle| cycle.response).sum();
     // Parts in phase with the mean, and a quarter of a period beside it.
@@ -409,7 +404,7 @@ impl Line {
     }
 
     /// Whether no motion of the particle produces it.
-    pub(crate) fn is_foreign(&self, d: &Dimensionless, sample_time: f64) -> bool {
+    fn is_foreign(&self, Knowledge { numbers: d, sample_time, .. }: &Knowledge) -> bool {
         let square = (self.turn / (sample_time * d.omega0)).powi(2);
         let largest = 4.0 / PI * d.epsilon * d.b * over_v(d.definition, square) / (square - 1.0).abs();
         self.amplitude() > ABOVE * largest
