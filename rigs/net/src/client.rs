@@ -323,21 +323,6 @@ impl NetController {
     pub fn counters(&self) -> Counters {
         self.client.counters
     }
-
-    /// The last answer, for a sample without one. It also lasts beyond the release: the bench waits for the answer to that.
-    fn held(&self) -> Command {
-        let settled = self.good.settled.map(|_| false);
-        Command { settled, ..self.good }
-    }
-
-    /// The answer to this sample or an earlier one.
-    fn read(&self, frame: &Frame) -> Result<Command, LinkError> {
-        if frame.kind == Kind::Drive && frame.sequence <= self.client.at {
-            return Ok(read_command(frame));
-        }
-        let (peer, time) = (self.client.peer, self.client.time());
-        Err(LinkError::Invalid { peer, time })
-    }
 }
 
 impl Controller for NetController {
@@ -355,9 +340,15 @@ impl Controller for NetController {
                     return Err(self.client.silent().into());
                 }
                 self.client.counters.hold(self.client.at + 1 - self.answered);
-                break self.held();
+                // The last answer. It also lasts beyond the release: the bench waits for the answer to that.
+                let settled = self.good.settled.map(|_| false);
+                break Command { settled, ..self.good };
             };
-            self.good = self.read(&frame)?;
+            if frame.kind != Kind::Drive || frame.sequence > self.client.at {
+                let (peer, time) = (self.client.peer, self.client.time());
+                return Err(LinkError::Invalid { peer, time }.into());
+            }
+            self.good = read_command(&frame);
             self.waiting = None;
             self.answered = frame.sequence + 1;
             if frame.sequence == self.client.at {
