@@ -247,9 +247,10 @@ impl Fmu {
 
     /// The variable for `ours`.
     pub fn find(&self, ours: &str, of: Use) -> Option<Variable> {
-        let variable = self.connections.iter().find(|one| one.ours == ours)?.variable?;
+        let connection = self.connections.iter().find(|one| one.ours == ours)?;
+        let variable = connection.variable?;
         if !variable.allows(of) && of != Use::Start {
-            log::warn!("{}; it is not used", self.unusable(ours, variable, of));
+            log::warn!("{}; it is not used", self.unusable(connection, variable, of));
         }
         Some(variable).filter(|variable| variable.allows(of))
     }
@@ -258,20 +259,18 @@ impl Fmu {
     pub fn need(&self, ours: &str, of: Use) -> Result<Variable, FmuError> {
         let connection = self.connections.iter().find(|one| one.ours == ours);
         let missing = || FmuError::Variable { path: self.path.clone(), name: ours.into() };
-        let variable = connection.and_then(|one| one.variable).ok_or_else(missing)?;
+        let found = connection.and_then(|one| Some((one, one.variable?)));
+        let (connection, variable) = found.ok_or_else(missing)?;
         match variable.allows(of) {
             true => Ok(variable),
-            false => Err(self.unusable(ours, variable, of)),
+            false => Err(self.unusable(connection, variable, of)),
         }
     }
 
-    fn unusable(&self, ours: &str, variable: Variable, of: Use) -> FmuError {
-        let connection = self.connections.iter().find(|one| one.ours == ours);
-        let theirs = connection.and_then(|one| Some(one.theirs.as_ref()?.0.clone()));
-        let name = theirs.unwrap_or_else(|| ours.into());
+    fn unusable(&self, Connection { ours, theirs, .. }: &Connection, variable: Variable, of: Use) -> FmuError {
         FmuError::Causality {
             path: self.path.clone(),
-            name,
+            name: theirs.as_ref().map_or(ours, |(name, _)| name).clone(),
             causality: variable.causality,
             of,
         }
