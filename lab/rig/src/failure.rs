@@ -79,10 +79,3 @@ fn lacking(names: &[String]) -> String {
         names => format!(": it lacks {}", names.join(", ")),
     }
 }
-
-impl RigError {
-    /// The error of the implementation, if it is an `E`.
-    pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
-        self.source()?.downcast_ref()
-    }
-}

@@ -137,7 +137,7 @@ const ADVICE_AS_ASKED: &str = "; set phase and drive of the controller, or contr
 impl From<ExperimentError> for Failure {
     fn from(error: ExperimentError) -> Self {
         let code = match &error {
-            ExperimentError::Rig(cause) if cause.cause::<Interrupted>().is_some() => INTERRUPTED,
+            ExperimentError::Rig(RigError::Failed(cause)) if cause.is::<Interrupted>() => INTERRUPTED,
             // The plant refuses a drive that comes from the scene.
             ExperimentError::NoDrive | ExperimentError::Rig(RigError::Refused(_)) => 2,
             _ => 1,
