@@ -15,4 +15,4 @@ pub mod record;
 pub mod rig;
 pub mod survey;
 
-pub use vines_scene::{cells, knowledge, linear, plan, scene, shaker_path};
+pub use vines_scene::{cells, knowledge, linear, plan, scene};
