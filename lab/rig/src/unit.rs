@@ -25,11 +25,16 @@ impl LowerExp for Quantity {
     }
 }
 
+/// The number with this many digits after the first one.
+#[must_use]
+pub fn rounded(value: f64, decimals: usize) -> f64 {
+    format!("{value:.decimals$e}").parse().unwrap_or(value)
+}
+
 /// Five digits, with an exponent if the number is very small or large.
 #[must_use]
 pub fn short(value: f64) -> String {
-    let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
-    format!("{rounded:?}").trim_end_matches(".0").into()
+    format!("{:?}", rounded(value, 4)).trim_end_matches(".0").into()
 }
 
 /// Symbols, SI units per unit, and the SI unit.

@@ -6,6 +6,7 @@ use std::fmt::Write;
 
 use lovines::{Drive, InvalidValue, Plant, Refused, StructureState};
 use phase_lock::{Config, Input, Output, PhaseLock};
+use vines_rig::unit::rounded;
 
 use super::{File, controller_values, parameter_set, plant_values};
 use crate::scene::{PAPER, Scene, Structure};
@@ -58,11 +59,6 @@ impl Half {
     }
 }
 
-/// A reading or a drive as its file has it: with seven digits.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.6e}").parse().unwrap_or(value)
-}
-
 /// The files of plant and controller.
 pub(super) fn resources() -> [Vec<File>; 2] {
     let scene = Scene::parse("paper.toml", PAPER, &[]).expect("the default scene is correct");
@@ -103,7 +99,8 @@ pub(super) fn sine(
         ..StructureState::default()
     };
     let mut plant = Plant::with_host(structure.host.clone(), scene.plant, &start)?;
-    let [amplitude, omega] = [amplitude, structure.mode().omega].map(rounded);
+    // Seven digits, as in the files.
+    let [amplitude, omega] = [amplitude, structure.mode().omega].map(|value| rounded(value, 6));
     let in_period = (std::f64::consts::TAU / (omega * step)).round() as u32;
     let samples = SINE_PERIODS * in_period;
     let mut half = Half::new(&format!("{signal},{input},omega"), "q1,q2,impacts");
@@ -141,7 +138,8 @@ fn couple(scene: &Scene, lock: &PhaseLock) -> Result<[Half; 2], InvalidValue> {
                 "{time},{omega:e},{amplitude:e},{response_amplitude:e},{locked}"
             );
         }
-        let [response, reference, amplitude, omega] = [v, base, amplitude, omega].map(rounded);
+        // Seven digits, as in the files.
+        let [response, reference, amplitude, omega] = [v, base, amplitude, omega].map(|value| rounded(value, 6));
         let _ = writeln!(of_plant.stimuli, "{time},{amplitude:e},{omega:e}");
         let _ = writeln!(of_controller.stimuli, "{time},{response:e},{reference:e},1");
         plant.advance(

@@ -10,6 +10,7 @@ use phase_lock::{
 use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
+use vines_rig::unit::rounded;
 
 use crate::knowledge::Knowledge;
 use crate::linear::LinearResponse;
@@ -154,10 +155,7 @@ impl Scene {
         let Err(error) = config.build() else { return Ok(()) };
         let unit = self.units().reference;
         // Five digits: the value has been multiplied and divided.
-        let shown = |metres: f64| {
-            let value = unit.of_metres(metres);
-            format!("{value:.4e}").parse().unwrap_or(value)
-        };
+        let shown = |metres: f64| rounded(unit.of_metres(metres), 4);
         match config.amplitude_max {
             Some(limit) if error.name == "amplitude" => Err(SceneError::Value {
                 key: "phase_lock.amplitude_max",

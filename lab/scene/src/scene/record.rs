@@ -1,6 +1,7 @@
 //! The sections `[record]`: how long to drive, to record and to average; and `[backbone]`: how the backbone is tracked.
 
 use serde::{Deserialize, Serialize};
+use vines_rig::unit::rounded;
 
 settings! {
     /// Durations of an experiment.
@@ -35,12 +36,8 @@ impl BackboneSettings {
         let [from, to] = [self.c_from, self.c_to].map(|level| level * b);
         let steps = f64::from(self.points.max(2) - 1);
         (0..self.points)
-            .map(|n| rounded(from + (to - from) * f64::from(n) / steps))
+            // To ten digits, as a person would write it: 0.0068, not 0.0067999999999999996.
+            .map(|n| rounded(from + (to - from) * f64::from(n) / steps, 9))
             .collect()
     }
-}
-
-/// The value to ten digits, as a person would write it: 0.0068, not 0.0067999999999999996.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.9e}").parse().unwrap_or(value)
 }
