@@ -15,6 +15,8 @@ use crate::record::{Element, Path, Record};
 
 /// Parts of a period for the integrals; Simpson's rule, because the trapezoidal one costs eight standard uncertainties at zeta = 0.03.
 const PARTS: usize = 4;
+/// A part, periods.
+const STEP: f64 = 1.0 / PARTS as f64;
 const SIMPSON: [f64; PARTS + 1] = [1.0 / 12.0, 4.0 / 12.0, 2.0 / 12.0, 4.0 / 12.0, 1.0 / 12.0];
 
 /// Columns of the model of a record: the known force, and a unit of each unknown.
@@ -55,12 +57,13 @@ struct Place {
     speed: f64,
     local: Local,
     lag: Complex64,
-    /// Weights of the force before, of S before and of S here in the force here.
-    weights: [Complex64; 3],
 }
 
+/// Weights of the force before, of S before and of S here in the force here.
+type Weights = [Complex64; 3];
+
 /// Weights of `lag d' + d = S` over a step, with S a straight line.
-fn weights(step: f64, lag: Complex64) -> [Complex64; 3] {
+fn weights(step: f64, lag: Complex64) -> Weights {
     if lag == Complex64::ZERO {
         return [0.0, 0.0, 1.0].map(Complex64::from);
     }
@@ -71,12 +74,11 @@ fn weights(step: f64, lag: Complex64) -> [Complex64; 3] {
 }
 
 /// The force of a steady one that varies along the path.
-fn follow(places: &[Place], steady: impl Fn(usize) -> Complex64) -> Vec<Complex64> {
+fn follow(weights: &[Weights], steady: impl Fn(usize) -> Complex64) -> Vec<Complex64> {
     let (mut before, mut force) = (steady(0), steady(0));
     let mut forces = vec![force];
-    for (k, place) in places.iter().enumerate().skip(1) {
+    for (k, [decay, then, now]) in weights.iter().enumerate().skip(1) {
         let here = steady(k);
-        let [decay, then, now] = place.weights;
         force = decay * force + then * before + now * here;
         before = here;
         forces.push(force);
@@ -100,26 +102,25 @@ fn places(record: &Record, force: &Force, path: &Path) -> Vec<Place> {
             };
         let logarithm = path.at(time)[0];
         let amplitude = logarithm.re.exp();
-        let lag = force.element.lag(amplitude);
         Place {
             time,
             amplitude,
             turn: Complex64::cis(logarithm.im),
             speed: 1.0 + rates.at(time)[0].re / record.linear.omega0,
             local: force.basis.at(logarithm.re),
-            lag,
-            weights: weights(1.0 / PARTS as f64, lag * force.lag),
+            lag: force.element.lag(amplitude),
         }
     };
     (0..time.len() - 1).flat_map(parts).chain(last).map(at).collect()
 }
 
-/// Force of the element's motion along the path less its steady force with its lag; `None` where the motion is lost.
+/// Force of the element's motion along the path less its steady force with its own lag; `None` where the motion is lost.
 fn beyond_lag(record: &Record, force: &Force, path: &Path, places: &[Place]) -> Vec<Option<Complex64>> {
     let Some(stretches) = force.element.along(path) else {
         return vec![Some(Complex64::ZERO); places.len()];
     };
-    let own = follow(places, |k| force.element.steady(places[k].amplitude));
+    let weights: Vec<Weights> = places.iter().map(|place| weights(STEP, place.lag)).collect();
+    let own = follow(&weights, |k| force.element.steady(places[k].amplitude));
     let mut beyond = vec![None; places.len()];
     for stretch in stretches {
         let first = places.partition_point(|place| place.time < stretch[0].0);
@@ -147,12 +148,16 @@ impl Columns {
         let places = places(record, force, &path);
         let beyond = beyond_lag(record, force, &path, &places);
         let size = force.basis.size;
+        let weights: Vec<Weights> = places
+            .iter()
+            .map(|place| weights(STEP, place.lag * force.lag))
+            .collect();
         let forces: Vec<Vec<Complex64>> = (0..size)
-            .map(|n| follow(&places, |k| value(&places[k].local, n).into()))
+            .map(|n| follow(&weights, |k| value(&places[k].local, n).into()))
             .collect();
         let sum = |k: usize| -> Complex64 { (0..size).map(|n| force.coefficients[n] * forces[n][k]).sum() };
         let sums: Vec<Complex64> = (0..places.len()).map(sum).collect();
-        let lags = follow(&places, |k| match places[k].lag {
+        let lags = follow(&weights, |k| match places[k].lag {
             Complex64::ZERO => Complex64::ZERO,
             _ => -(places[k].local.sum(force.coefficients) - sums[k]) / force.lag,
         });
@@ -168,7 +173,7 @@ impl Columns {
         let far = |k: usize| record.linear.far(record.periods.omega[k]);
         let count = record.periods.time.len();
         let mut columns = Self {
-            increments: vec![vec![Complex64::ZERO; size + 4]],
+            increments: vec![vec![Complex64::ZERO; size + 3]],
             direct: Vec::new(),
             feedback: vec![Matrix2::zeros()],
             path: (0..count)
@@ -180,7 +185,7 @@ impl Columns {
         columns.increments[0][size + 2] = Complex64::ONE;
         for k in 0..count {
             let mut direct: Vec<Complex64> = rows[k * PARTS].iter().map(|force| force * far(k)).collect();
-            direct.extend([Complex64::ZERO, record.periods.held[k]]);
+            direct.push(Complex64::ZERO);
             columns.direct.push(direct);
         }
         for k in 0..count - 1 {
@@ -216,7 +221,7 @@ impl Columns {
         places: &[Place],
     ) {
         let (duration, power) = (record.steps[k], record.power);
-        let mut increments = vec![Complex64::ZERO; rows[0].len() + 2];
+        let mut increments = vec![Complex64::ZERO; rows[0].len() + 1];
         let mut derivatives = [Complex64::ZERO; 2];
         for (part, weight) in SIMPSON.iter().enumerate() {
             let left = 1.0 - part as f64 / PARTS as f64;

@@ -25,10 +25,14 @@ pub struct Curve {
     pub coefficients: Vec<Complex64>,
     /// Covariance of their real and imaginary parts.
     pub covariance: DMatrix<f64>,
-    /// Rows, of variance 1, of what the record says of the coefficients without any prior.
+    /// Rows, of variance 1, of what the record says of the coefficients and of the factor of the lag, without any prior.
     pub information: DMatrix<f64>,
     /// The measured values of these rows.
     pub expected: DVector<f64>,
+    /// Change of the measured values where the base reads too much, over the share of it.
+    pub by_gain: DVector<f64>,
+    /// Twice the negative logarithm of the likelihood of what agrees with all rows, without constants.
+    pub deviance: f64,
 }
 
 /// Drive and frequency of phase resonance at some amplitudes.
@@ -121,19 +125,28 @@ impl Curve {
             };
             (share * of).powi(2)
         };
-        let floor = DMatrix::from_diagonal(&DVector::from_fn(self.covariance.nrows(), |n, _| variance(n)));
-        self.covariance += &floor;
+        let n = self.covariance.nrows();
+        let floor = DVector::from_fn(self.information.ncols(), |i, _| if i < n { variance(i) } else { 0.0 });
+        self.covariance += DMatrix::from_diagonal(&floor.rows(0, n).into_owned());
+        self.with_errors(floor)
+    }
+
+    /// With independent errors of these variances, of the functions and of the factor of the lag. `None` where rounding leaves no covariance.
+    pub(crate) fn with_errors(mut self, variances: DVector<f64>) -> Option<Self> {
+        let floor = DMatrix::from_diagonal(&variances);
         let rows = self.information.nrows();
         let of_rows = DMatrix::identity(rows, rows) + &self.information * floor * self.information.transpose();
         let whitened = of_rows.cholesky()?.l();
         self.information = whitened.solve_lower_triangular(&self.information)?;
-        self.expected = whitened.solve_lower_triangular(&self.expected)?;
+        for values in [&mut self.expected, &mut self.by_gain] {
+            *values = whitened.solve_lower_triangular(values)?;
+        }
         Some(self)
     }
 
-    /// What the record contradicts in a backbone: residuals of variance 1. Beyond its ends the backbone's force continues as it ends. `None` for
-    /// fewer than four points, and for points that do not rise.
-    pub fn residuals(&self, backbone: &[[f64; 3]]) -> Option<DVector<f64>> {
+    /// What the record contradicts in a backbone, if the lag of its element has this factor and its base reads the share `gain` too much: residuals of
+    /// variance 1. Beyond its ends the backbone's force continues as it ends. `None` for fewer than four points, and for points that do not rise.
+    pub fn residuals(&self, backbone: &[[f64; 3]], lag: Complex64, gain: f64) -> Option<DVector<f64>> {
         let logarithms: Vec<f64> = backbone.iter().map(|point| point[0].ln()).collect();
         let (first, last) = (*logarithms.first()?, *logarithms.last()?);
         // No number rises.
@@ -150,7 +163,7 @@ impl Curve {
         let at = |a: f64| (a, spline.at(a.clamp(first, last))[0]);
         let force: Vec<(f64, Complex64)> = self.basis.spread(POINTS * self.basis.size).map(at).collect();
         let coefficients = Self::coefficients(&self.basis, &force)?;
-        let parts: Vec<f64> = coefficients.iter().flat_map(|c| [c.re, c.im]).collect();
-        Some(&self.information * DVector::from_vec(parts) - &self.expected)
+        let parts: Vec<f64> = coefficients.iter().chain([&lag]).flat_map(|c| [c.re, c.im]).collect();
+        Some(&self.information * DVector::from_vec(parts) - &self.expected - &self.by_gain * gain)
     }
 }

@@ -123,23 +123,28 @@ impl Filter {
         Self { periods, used: used.to_vec(), logarithms }
     }
 
-    /// Whitened innovations, a row for each component of each used period: of the record, and of a unit of the real and of the imaginary part of
-    /// each unknown.
+    /// Whitened innovations, a row for each component of each used period: of the record, of its change where the base moved more than it read, over the
+    /// share of it, and of a unit of the real and of the imaginary part of each unknown.
     pub fn whiten(&self, record: &Record, columns: &Columns) -> DMatrix<f64> {
         let unknowns = columns.direct[0].len() - 1;
         let rows = 2 * self.used.iter().filter(|used| **used).count();
-        let mut state = vec![Vector2::zeros(); 1 + 2 * unknowns];
-        let mut white = DMatrix::zeros(1 + 2 * unknowns, rows);
+        let mut state = vec![Vector2::zeros(); 2 + 2 * unknowns];
+        let mut white = DMatrix::zeros(2 + 2 * unknowns, rows);
         let mut row = 0;
+        let linear = &record.periods.linear;
         for (k, period) in self.periods.iter().enumerate() {
-            let known = pair(columns.increments[k][0]) - columns.feedback[k] * pair(columns.path[k.saturating_sub(1)]);
-            let of_record = [known, pair(columns.direct[k][0] - record.departure[k])];
+            let (increments, direct, before) = (&columns.increments[k], &columns.direct[k], k.saturating_sub(1));
+            let fed_back = |path: Complex64| columns.feedback[k] * pair(path);
             for (n, x) in state.iter_mut().enumerate() {
-                let (unknown, is_imaginary) = (n.div_ceil(2), n > 0 && n % 2 == 0);
-                let [increment, direct] = match (n, is_imaginary) {
-                    (0, _) => of_record,
-                    (_, false) => [&columns.increments, &columns.direct].map(|of| pair(of[k][unknown])),
-                    (_, true) => [&columns.increments, &columns.direct].map(|of| pair(Complex64::i() * of[k][unknown])),
+                let of_unknown = |unit: Complex64| [increments, direct].map(|of| pair(unit * of[n / 2]));
+                let [increment, direct] = match n {
+                    0 => [
+                        pair(increments[0]) - fed_back(columns.path[before]),
+                        pair(direct[0] - record.departure[k]),
+                    ],
+                    1 => [-fed_back(linear[before]), -pair(linear[k])],
+                    _ if n % 2 == 0 => of_unknown(Complex64::ONE),
+                    _ => of_unknown(Complex64::i()),
                 };
                 let [_, innovation] = period.advance(x, increment, direct);
                 if self.used[k] {
@@ -148,7 +153,7 @@ impl Filter {
             }
             row += if self.used[k] { 2 } else { 0 };
         }
-        white.row_mut(0).neg_mut();
+        white.rows_mut(0, 2).neg_mut();
         white
     }
 

@@ -15,8 +15,6 @@ const FUNCTIONS: usize = 23;
 /// Standard uncertainty of the factor of an element's lag, of each component: closed forms of first order are that good. Mixtures at 75 dB have
 /// 1.00 ± 0.01.
 const U_LAG: f64 = 0.02;
-/// Share of a sample through which a base holds its amplitude, and its standard uncertainty: all of it in a simulation, none on a smooth base.
-const HELD: (f64, f64) = (0.5, 0.5);
 /// Information on u at the start: none, but for rounding.
 const START_INFORMATION: f64 = 1e-30;
 /// Uncertainty of the curvature of an element's own force, relative: what the uncertainties of a drawing move it by.
@@ -50,7 +48,7 @@ pub struct Estimate<'a> {
     columns: Columns,
 }
 
-/// The unknowns: spline, lag, u at the start, and the share of a sample through which the base holds its amplitude, real and imaginary part of each.
+/// The unknowns: spline, lag, and u at the start, real and imaginary part of each.
 pub struct Solution {
     /// Twice the negative logarithm of the likelihood, without constants.
     pub deviance: f64,
@@ -58,8 +56,10 @@ pub struct Solution {
     pub unknowns: DVector<f64>,
     /// The equations with the prior.
     normal: Cholesky<f64, Dyn>,
-    /// The matrix without the prior, and the right-hand side, in which the lag has one.
-    information: (DMatrix<f64>, DVector<f64>),
+    /// The matrix and the right-hand side without priors, and how the latter changes with the gain of the base.
+    information: (DMatrix<f64>, DMatrix<f64>),
+    /// Twice the negative logarithm of the likelihood with all unknowns 0, without constants.
+    without: f64,
     /// Innovations that the unknowns leave, with variance 1.
     pub innovations: Vec<f64>,
 }
@@ -69,8 +69,22 @@ impl<'a> Estimate<'a> {
     /// the functions' number of periods is left.
     pub fn new(record: &'a Record, element: &'a dyn Element, scale: f64, used: &[bool]) -> Option<Self> {
         let response = &record.periods.response;
-        let is_used = |(used, z): (&bool, &Complex64)| *used && element.is_smooth(z.norm());
-        let mut used: Vec<bool> = used.iter().zip(response).map(is_used).collect();
+        let is_smooth = |(used, z): (&bool, &Complex64)| *used && element.is_smooth(z.norm());
+        let mut used: Vec<bool> = used.iter().zip(response).map(is_smooth).collect();
+        let first = Self::of_periods(record, element, scale, &used)?;
+        used.iter_mut()
+            .zip(&first.columns.lost)
+            .for_each(|(used, lost)| *used &= !lost);
+        // The drift of a fundamental is known between two others of the same motion only.
+        let kept = used.clone();
+        let neighbours = |k: usize| k > 0 && kept[k - 1] && kept.get(k + 1).is_some_and(|next| *next);
+        used.iter_mut().enumerate().for_each(|(k, used)| *used &= neighbours(k));
+        Self::of_periods(record, element, scale, &used)
+    }
+
+    /// With exactly these periods.
+    pub fn of_periods(record: &'a Record, element: &'a dyn Element, scale: f64, used: &[bool]) -> Option<Self> {
+        let (response, used) = (&record.periods.response, used.to_vec());
         let logarithms = used
             .iter()
             .zip(response)
@@ -91,13 +105,6 @@ impl<'a> Estimate<'a> {
         let lag = Complex64::ONE;
         let force = Force { element, basis, coefficients: &coefficients, lag };
         let mut columns = Columns::new(record, &force, response);
-        used.iter_mut()
-            .zip(&columns.lost)
-            .for_each(|(used, lost)| *used &= !lost);
-        // The drift of a fundamental is known between two others of the same motion only.
-        let kept = used.clone();
-        let neighbours = |k: usize| k > 0 && kept[k - 1] && kept.get(k + 1).is_some_and(|next| *next);
-        used.iter_mut().enumerate().for_each(|(k, used)| *used &= neighbours(k));
         columns.keep_feedback(&used);
         let seconds = coefficients.windows(3).map(|c| (c[0] - 2.0 * c[1] + c[2]).norm_sqr());
         let least = SHAPE * (seconds.sum::<f64>() / (FUNCTIONS - 2) as f64).sqrt() / scale;
@@ -119,17 +126,10 @@ impl<'a> Estimate<'a> {
         })
     }
 
-    /// The path as given, without the errors of it, no curvature expected of the force, and a smooth base: for comparison.
+    /// The path as given, without the errors of it, and no curvature expected of the force: for comparison.
     pub fn with_given_path(mut self) -> Self {
         self.own.fill(Complex64::ZERO);
         self.columns.feedback.iter_mut().for_each(|one| one.fill(0.0));
-        for direct in &mut self.columns.direct {
-            direct
-                .iter_mut()
-                .last()
-                .into_iter()
-                .for_each(|held| *held = Complex64::ZERO);
-        }
         self
     }
 
@@ -143,35 +143,30 @@ impl<'a> Estimate<'a> {
         let filter = self.filter(hyper);
         let white = filter.whiten(self.record, &self.columns);
         let products = &white * white.transpose();
-        let n = products.nrows() - 1;
-        let information = products.view((1, 1), (n, n)).into_owned();
-        let right = products.view((1, 0), (n, 1)).into_owned();
+        let n = products.nrows() - 2;
+        let information = products.view((2, 2), (n, n)).into_owned();
+        let right = products.view((2, 0), (n, 2)).into_owned();
         let m = self.basis.size;
         let (mut normal, mut known) = (information.clone(), right.column(0).into_owned());
         for (part, change) in [1.0 - self.lag.re, -self.lag.im].into_iter().enumerate() {
             normal[(2 * m + part, 2 * m + part)] += U_LAG.powi(-2);
             known[2 * m + part] += change * U_LAG.powi(-2);
             normal[(2 * m + 2 + part, 2 * m + 2 + part)] += START_INFORMATION;
-            // A base holds its amplitude through a sample, or changes it smoothly, or does something between the two.
-            normal[(2 * m + 4 + part, 2 * m + 4 + part)] += HELD.1.powi(-2);
-            known[2 * m + 4 + part] += if part == 0 { HELD.0 } else { 0.0 } * HELD.1.powi(-2);
         }
-        let right = known.clone();
         let constant = self.expect(&mut normal, &mut known, hyper[1]);
         let normal = normal.cholesky()?;
         let unknowns = normal.solve(&known);
-        let deviance = filter.logarithms + products[(0, 0)] + constant - known.dot(&unknowns)
-            + normal.ln_determinant()
-            + (HELD.0 / HELD.1).powi(2)
-            + 4.0 * HELD.1.ln()
-            + 4.0 * (m - 2) as f64 * hyper[1].ln();
-        let innovations = white.row(0).transpose() - white.rows(1, n).tr_mul(&unknowns);
+        let without = filter.logarithms + products[(0, 0)];
+        let deviance =
+            without + constant - known.dot(&unknowns) + normal.ln_determinant() + 4.0 * (m - 2) as f64 * hyper[1].ln();
+        let innovations = white.row(0).transpose() - white.rows(2, n).tr_mul(&unknowns);
         let innovations = innovations.as_slice().to_vec();
         deviance.is_finite().then_some(Solution {
             deviance,
             unknowns,
             normal,
             information: (information, right),
+            without,
             innovations,
         })
     }
@@ -248,23 +243,31 @@ impl<'a> Estimate<'a> {
     pub fn curve(&self, solution: &Solution) -> Option<Curve> {
         let n = 2 * self.basis.size;
         let covariance = solution.normal.inverse().view((0, 0), (n, n)).into_owned();
-        let (information, expected) = solution.of_the_force(n)?;
-        Some(Curve {
+        let (information, mut values, deviance) = solution.of_the_force(n + 2)?;
+        for (part, lag) in [self.lag.re, self.lag.im].into_iter().enumerate() {
+            let moved = values.column(0) + information.column(n + part) * lag;
+            values.set_column(0, &moved);
+        }
+        let errors = DVector::from_fn(n + 2, |i, _| if i < n { 0.0 } else { U_LAG * U_LAG });
+        Curve {
             linear: self.record.linear,
             power: self.record.power,
             basis: self.basis,
             coefficients: complex(&solution.unknowns)[..self.basis.size].to_vec(),
             covariance,
             information,
-            expected,
-        })
+            expected: values.column(0).into_owned(),
+            by_gain: values.column(1).into_owned(),
+            deviance,
+        }
+        .with_errors(errors)
     }
 }
 
 impl Solution {
-    /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, and their values: the equations, without the
-    /// other unknowns.
-    fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, and their values, with their change by the gain of the
+    /// base: the equations, without the other unknowns. Last, the deviance of what agrees with them.
+    fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DMatrix<f64>, f64)> {
         let (all, right) = &self.information;
         let rest = all.nrows() - n;
         // The others keep their prior, which the equations with it contain.
@@ -273,17 +276,18 @@ impl Solution {
         let inverse = with_prior.cholesky()?;
         let cross = all.view((n, 0), (rest, n)).into_owned();
         let matrix = all.view((0, 0), (n, n)) - cross.tr_mul(&inverse.solve(&cross));
-        let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&right.rows(n, rest).into_owned()));
+        let of_others = right.rows(n, rest).into_owned();
+        let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&of_others));
         let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, 30 * n)?;
         let largest = eigen.eigenvalues.max();
         let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > ROUNDING * largest).collect();
         let row = |i: &usize| eigen.eigenvectors.column(*i).transpose() * eigen.eigenvalues[*i].sqrt();
-        let value = |i: &usize| eigen.eigenvectors.column(*i).dot(&known) / eigen.eigenvalues[*i].sqrt();
-        let rows: Vec<_> = kept.iter().map(row).collect();
-        Some((
-            DMatrix::from_rows(&rows),
-            DVector::from_iterator(kept.len(), kept.iter().map(value)),
-        ))
+        let value = |i: &usize| eigen.eigenvectors.column(*i).tr_mul(&known) / eigen.eigenvalues[*i].sqrt();
+        let [rows, values]: [Vec<_>; 2] = [kept.iter().map(row).collect(), kept.iter().map(value).collect()];
+        let values = DMatrix::from_rows(&values);
+        let of_others = of_others.column(0).dot(&inverse.solve(&of_others).column(0));
+        let deviance = self.without - of_others - values.column(0).norm_squared();
+        Some((DMatrix::from_rows(&rows), values, deviance))
     }
 }
 

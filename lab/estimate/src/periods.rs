@@ -17,8 +17,8 @@ pub struct Periods {
     pub response: Vec<Complex64>,
     /// Fundamental of the linear response.
     pub linear: Vec<Complex64>,
-    /// Fundamental of what a base that holds its amplitude through a sample changes in the linear response.
-    pub held: Vec<Complex64>,
+    /// Fundamental of the base.
+    pub base: Vec<Complex64>,
     /// Variance of a component of the fundamental of the response by noise.
     pub noise: Vec<f64>,
     /// Variance of a component of the fundamental of the base by noise.
@@ -136,19 +136,6 @@ fn envelope(signal: &[f64], step: f64) -> Vec<Complex64> {
     envelope
 }
 
-/// What a base has beside straight lines between its samples if it holds its amplitude from one to the next: it is late by half of each change.
-pub fn held(base: &[f64], step: f64) -> Vec<f64> {
-    let envelope = envelope(base, step);
-    let at = |k: usize| {
-        let before = envelope[k.saturating_sub(1)].norm();
-        let after = envelope[(k + 1).min(envelope.len() - 1)].norm();
-        // The frame turns a sine to -i/2 of its amplitude.
-        let sine = (envelope[k] * Complex64::cis(step * k as f64)).re / envelope[k].norm();
-        -0.5 * (after - before) * if sine.is_finite() { sine } else { 0.0 }
-    };
-    (0..base.len()).map(at).collect()
-}
-
 /// Turns of the response at each sample.
 fn turns(response: &[f64], step: f64) -> Vec<f64> {
     let angles = unwrapped(envelope(response, step).iter().map(|value| value.arg()));
@@ -183,7 +170,7 @@ impl Periods {
     /// those of what the smooth fundamental leaves: growth inside a period would inflate them.
     /// `readings`: what the sensors of response and base read.
     pub fn new(
-        [response, linear, held]: [&[f64]; 3],
+        [response, linear, base]: [&[f64]; 3],
         readings: [&[f64]; 2],
         sample_time: f64,
         omega: f64,
@@ -209,8 +196,8 @@ impl Periods {
             periods.omega.push(TAU * turn_per_sample / sample_time);
             periods.time.push((i as f64 + 0.5 * (j - i - 1) as f64) * sample_time);
         }
-        [periods.response, periods.linear, periods.held] =
-            [response, linear, held].map(|signal| periods.smooth(&fits, &phases, signal, omega));
+        [periods.response, periods.linear, periods.base] =
+            [response, linear, base].map(|signal| periods.smooth(&fits, &phases, signal, omega));
         let envelope = CubicSpline::new(periods.time.clone(), periods.response.clone());
         let mut rest = response.to_vec();
         for (k, value) in rest.iter_mut().enumerate().take(edges[edges.len() - 1]).skip(edges[0]) {

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use crate::interpolation::{CubicSpline, unwrapped};
 use crate::linear::Linear;
-use crate::periods::{Periods, held};
+use crate::periods::Periods;
 
 /// The force of what is not linear, by the amplitude of the response. Forces are displacements of the base, m, relative to the phase of the response.
 pub trait Element {
@@ -142,9 +142,8 @@ impl Record {
         let Signals { response, base, readings, sample_time } = *signals;
         let mean = base.iter().sum::<f64>() / base.len() as f64;
         let moving: Vec<f64> = base.iter().map(|x| x - mean).collect();
-        let late = linear.response(&held(&moving, linear.omega0 * sample_time), sample_time);
         let mut periods = Periods::new(
-            [response, &linear.response(&moving, sample_time), &late],
+            [response, &linear.response(&moving, sample_time), base],
             readings,
             sample_time,
             linear.omega0,
@@ -156,6 +155,17 @@ impl Record {
         }
         periods.noise = averaged(&periods.noise);
         periods.base_noise = averaged(&periods.base_noise);
+        // Between samples an amplitude may change in a straight line, at one of them, or at once: then it is a pulse at any phase.
+        for k in 1..periods.base.len() {
+            let [change, samples] = [
+                periods.base[k].norm() - periods.base[k - 1].norm(),
+                (periods.time[k] - periods.time[k - 1]) / sample_time,
+            ];
+            let unknown = (0.5 * change / samples).powi(2);
+            periods.base_noise[k - 1..=k]
+                .iter_mut()
+                .for_each(|variance| *variance += unknown);
+        }
         let departure = periods
             .response
             .iter()

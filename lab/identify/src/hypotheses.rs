@@ -15,7 +15,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
-use vines_estimate::{Backbone, Basis, CubicSpline, Curve};
+use vines_estimate::{Backbone, Basis, CubicSpline, Curve, Element, Linear};
 use vines_model::Definition;
 use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, equally_spaced, mean, range};
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
@@ -24,8 +24,10 @@ use crate::branch::Branch;
 use crate::hypothesis::{Hypothesis, TYPICAL, impact_speed, plant};
 use crate::ideal_rig::IdealRig;
 use crate::motions::{AMPLITUDES, Goal, Motions, Place, backbone, uncertainties};
+use crate::particle::Particle;
 use crate::points::MeasuredPoint;
 use crate::quantity::{Known, Quantity, STEP, UNKNOWNS, Unknowns, gradient, moved, unknowns};
+use crate::record::Source;
 
 /// What a record says.
 #[derive(Debug, Clone)]
@@ -36,6 +38,12 @@ pub struct MeasuredCurve {
     pub curve: Curve,
     /// Times, s, and amplitudes of the response, m, of the periods that were used.
     pub periods: Vec<[f64; 2]>,
+    /// What it was read from.
+    pub source: Source,
+    /// The particle with which it was read.
+    pub read: Particle,
+    /// Relative error of the curve beside noise.
+    pub resolution: f64,
 }
 
 /// What was measured on a rig.
@@ -69,6 +77,8 @@ const WIDTHS: usize = 8;
 const THEORY: f64 = 0.04;
 /// Gain of a further step, relative to one and chi-square, at which a minimum counts as found: of a curve in closed form, and of one of motions.
 const LEAST_GAIN: [f64; 2] = [1e-9, 1e-4];
+/// How often a hypothesis reads records again: with the particle that its first fit found, and with that of the second.
+const READINGS: usize = 2;
 /// Amplitudes that count as equal to one of a record, relative.
 const ASIDE: f64 = 0.03;
 
@@ -141,6 +151,8 @@ pub struct Fit {
     speed: f64,
     /// Chi-square.
     pub chi_square: f64,
+    /// By how much less likely the records are as the hypothesis reads them than as the ideal cavity does, as chi-square.
+    pub unlikely: f64,
     /// Its degrees of freedom.
     pub degrees: usize,
     /// Residuals of the points over their standard uncertainties: response, frequency, drive.
@@ -457,25 +469,56 @@ impl Data {
                 true => vec![with_friction, with(start, 0.0), with(unknowns(expected), TYPICAL)],
             };
             match problem.best(starts.into_iter()) {
-                Some(fit) => fits.push(fit),
+                Some(fit) => fits.push(self.read_again(fit)),
                 None => not_fitted.push(hypothesis),
             }
         }
-        let least = fits.iter().map(|fit| fit.chi_square).fold(f64::INFINITY, f64::min);
-        let fewest = fits
-            .iter()
-            .filter(|fit| fit.chi_square == least)
-            .map(|fit| fit.degrees)
-            .max()
-            .unwrap_or(0);
+        // What its own data reject is no measure of the others.
+        let total = |fit: &Fit| fit.chi_square + fit.unlikely;
+        let possible = fits.iter().filter(|fit| fit.rejection().is_none());
+        let best = possible.min_by(|one, other| total(one).total_cmp(&total(other)));
+        let best = best.map(|fit| (total(fit), fit.degrees));
         for fit in &mut fits {
-            let excess = fit.chi_square - least;
-            let difference = fit.degrees.abs_diff(fewest).max(1) as f64;
-            let exceeds = probability(excess, difference).is_some_and(|p| p < EXCLUDED);
-            let exceeds = exceeds.then(|| format!("chi-square exceeds the smallest by {excess:.0}"));
+            let exceeds = best.and_then(|(least, degrees)| {
+                let (excess, difference) = (total(fit) - least, fit.degrees.abs_diff(degrees).max(1) as f64);
+                let is_excess = probability(excess, difference).is_some_and(|p| p < EXCLUDED);
+                is_excess.then(|| format!("chi-square exceeds the smallest by {excess:.0}"))
+            });
             fit.excluded = fit.rejection().or(exceeds);
         }
         Ok(Hypotheses { fits, not_fitted, has_scene: self.scene.is_some() })
+    }
+
+    /// The fit to the records as the hypothesis itself reads them: with its particle and its linear response. The fit to the first reading, if that fails.
+    fn read_again(&self, first: Fit) -> Fit {
+        if self.curves.is_empty() || !first.hypothesis.is_cavity() {
+            return first;
+        }
+        let again = |fit: &Fit| {
+            let problem = Problem { speed: fit.speed, ..self.problem(fit.hypothesis, fit.x) };
+            let at = problem.at(&fit.x, &problem.start(&fit.x)?)?;
+            let linear = Linear { omega0: fit.x[0].exp(), zeta: fit.x[1] };
+            let itself = problem.itself(&fit.x, &at);
+            let powers = DMatrix::from_fn(itself.len(), 4, |n, power| itself[n][0].ln().powi(power as i32));
+            let ratios = DVector::from_fn(itself.len(), |n, _| itself[n][2] / linear.omega0);
+            let frequency = powers.svd(true, true).solve(&ratios, f64::EPSILON).ok()?;
+            let frequency = std::array::from_fn(|power| frequency[power]);
+            let read = Particle { frequency, ..problem.particle(&fit.x) };
+            let curves = self.curves.iter().map(|one| {
+                let curve = one.source.read(read, &itself, linear)?.resolved(one.resolution)?;
+                Some(MeasuredCurve { curve, read, ..one.clone() })
+            });
+            let data = Self { curves: curves.collect::<Option<_>>()?, ..self.clone() };
+            let deviance = |data: &Self| data.curves.iter().map(|one| one.curve.deviance).sum::<f64>();
+            let problem = Problem { speed: fit.speed, ..data.problem(fit.hypothesis, fit.x) };
+            let next = problem.best(std::iter::once(fit.x))?;
+            Some(Fit { unlikely: deviance(&data) - deviance(self), ..next })
+        };
+        let mut fit = first;
+        for _ in 0..READINGS {
+            fit = again(&fit).unwrap_or(fit);
+        }
+        fit
     }
 
     /// Whether it is known that something does not act.
@@ -679,16 +722,45 @@ impl Problem<'_> {
         }
     }
 
+    /// The backbone of the rig itself, whatever its reference reads.
+    fn itself(&self, x: &Unknowns, at: &AtData) -> Backbone {
+        let gain = self.hypothesis.gain(x);
+        let itself = at
+            .backbone
+            .iter()
+            .map(|[a, drive, omega]| [*a, drive / (1.0 + gain), *omega]);
+        itself.collect()
+    }
+
     /// Residuals of points, perpendicular to the curve, and of records.
-    fn of_data(&self, at: &AtData) -> Option<Vec<f64>> {
+    fn of_data(&self, x: &Unknowns, at: &AtData) -> Option<Vec<f64>> {
         let mut residuals: Vec<f64> = Vec::new();
         for [apart, along] in &at.apart {
             residuals.extend(across(along, apart).iter());
         }
-        for MeasuredCurve { curve, .. } in &self.data.curves {
-            residuals.extend(curve.residuals(&at.backbone)?.iter());
+        let (itself, gain) = (self.itself(x, at), self.hypothesis.gain(x));
+        for MeasuredCurve { curve, read, .. } in &self.data.curves {
+            residuals.extend(curve.residuals(&itself, self.lag(x, curve, read), gain)?.iter());
         }
         residuals.iter().all(|one| one.is_finite()).then_some(residuals)
+    }
+
+    /// Lag of the particle over that of the particle with which a record was read: the mean over its amplitudes.
+    fn lag(&self, x: &Unknowns, curve: &Curve, read: &Particle) -> Complex64 {
+        if !self.hypothesis.is_cavity() {
+            return Complex64::ZERO;
+        }
+        let own = Particle { frequency: read.frequency, ..self.particle(x) };
+        let ratios = curve
+            .basis
+            .spread(AMPLITUDES)
+            .map(|a| own.lag(a.exp()) / read.lag(a.exp()));
+        ratios.sum::<Complex64>() / AMPLITUDES as f64
+    }
+
+    fn particle(&self, x: &Unknowns) -> Particle {
+        let sensor = self.data.definition.sensor;
+        self.hypothesis.particle(x, self.is_free(6), self.speed, sensor)
     }
 
     /// Residuals of what is known, and of the unknowns that are held.
@@ -770,6 +842,7 @@ impl Problem<'_> {
             has_friction: self.is_free(6),
             speed: self.speed,
             chi_square: minimum.chi_square,
+            unlikely: 0.0,
             degrees: self.equations().saturating_sub(free),
             residuals: minimum.residuals.as_chunks().0[..count].to_vec(),
             channels,
@@ -792,7 +865,7 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
             true => self.motions(x)?.near(near)?,
             false => Vec::new(),
         };
-        let mut residuals = self.of_data(&self.at(x, &places)?)?;
+        let mut residuals = self.of_data(x, &self.at(x, &places)?)?;
         residuals.extend(self.of_known(x));
         Some((residuals, places))
     }
@@ -808,9 +881,9 @@ impl Misfit<UNKNOWNS> for Problem<'_> {
             for ([_, there], [_, along]) in at.apart.iter_mut().zip(&here.apart) {
                 *there = *along;
             }
-            self.of_data(&at)
+            self.of_data(x, &at)
         };
-        let before = self.of_data(&here)?;
+        let before = self.of_data(x, &here)?;
         let [low, high] = [0, 1].map(|end| self.limits().map(|limits| limits[end]));
         let mut rows = vec![Unknowns::zeros(); before.len()];
         for i in (0..UNKNOWNS).filter(|i| self.is_free(*i) && *i != 5) {

@@ -3,9 +3,10 @@
 use lovines::cavity::GRAVITY;
 use lovines::{Cavity, Parameters, Restitution};
 use vines_model::theory::{B_SYMMETRY_BREAKING, Manifold};
-use vines_model::{Definition, Dimensionless};
+use vines_model::{Definition, Dimensionless, Sensor};
 
 use crate::branch::{self, Branch};
+use crate::particle::{Law, Particle};
 use crate::quantity::{Quantity, Unknowns};
 
 /// What may be true of a rig. Friction acts beside every other effect: half-width and mass ratio make up for it, so that data rarely exclude it.
@@ -125,8 +126,29 @@ impl Hypothesis {
                 let ratio = amplitude / x[3].exp();
                 [amplitude, omega * (1.0 + 0.375 * x[7] * ratio * ratio), drive]
             }
-            Self::Reference => [amplitude, omega, drive * (1.0 + x[7])],
-            _ => [amplitude, omega, drive],
+            _ => [amplitude, omega, drive * (1.0 + self.gain(x))],
+        }
+    }
+
+    /// The share that the reference reads too much.
+    pub(crate) fn gain(self, x: &Unknowns) -> f64 {
+        if self == Self::Reference { x[7] } else { 0.0 }
+    }
+
+    /// Its particle. A law of restitution has the value r at the impact speed `speed`, m/s.
+    pub(crate) fn particle(self, x: &Unknowns, has_friction: bool, speed: f64, sensor: Sensor) -> Particle {
+        let (b, omega0) = (x[3].exp(), x[0].exp());
+        let friction = if has_friction { x[6].max(0.0) } else { 0.0 };
+        let law = match self {
+            Self::Viscoelastic => Law::Viscoelastic,
+            Self::Plastic => Law::Plastic,
+            _ => Law::Constant,
+        };
+        Particle {
+            friction: GRAVITY * friction / (b * omega0 * omega0),
+            law,
+            speed: speed / (b * omega0),
+            ..Particle::ideal([x[4].exp(), b, x[2]], sensor)
         }
     }
 

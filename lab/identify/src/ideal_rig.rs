@@ -8,6 +8,7 @@ use vines_estimate::{Backbone, Linear};
 use vines_model::{Definition, Dimensionless, Sensor};
 
 use crate::branch::Branch;
+use crate::particle::Particle;
 use crate::quantity::Quantity;
 
 /// The parameters of an ideal cavity.
@@ -85,6 +86,11 @@ impl IdealRig {
             b: self.b,
             definition: Definition { sensor, ..Definition::default() },
         }
+    }
+
+    /// Its particle.
+    pub fn particle(&self, sensor: Sensor) -> Particle {
+        Particle::ideal([self.epsilon, self.b, self.r], sensor)
     }
 
     /// The exact backbone above the fold, by rising amplitude; `None` where a fit has left what is possible.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::SVector;
 use num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use vines_estimate::{Curve, Estimate, Record, Signals, Window};
+use vines_estimate::{Curve, Estimate, Linear, Record, Signals, Window};
 use vines_model::Sensor;
 use vines_model::numerics::{LeastSquares, Misfit};
 
@@ -44,6 +44,8 @@ pub struct Identified {
     pub amplitude: Vec<f64>,
     /// The windows and their most probable motions.
     pub motions: Vec<(Window, usize)>,
+    /// The particle that lags by a factor 1.
+    pub read: Particle,
     /// Factor of the particle's lag: 1 if its closed form holds.
     pub lag: Complex64,
     /// Innovations, of variance 1 if the model holds.
@@ -109,7 +111,10 @@ fn fit(curve: &Curve, sensor: Sensor, start: &IdealRig, prior: &IdealRig) -> Opt
     let mut u = IdealRig::UNCERTAINTY;
     u[2] /= prior.r * (1.0 - prior.r);
     let residuals = |x: &SVector<f64, 5>| {
-        let mut residuals = curve.residuals(&IdealRig::of(x).backbone(sensor)?)?.as_slice().to_vec();
+        let mut residuals = curve
+            .residuals(&IdealRig::of(x).backbone(sensor)?, Complex64::ONE, 0.0)?
+            .as_slice()
+            .to_vec();
         residuals.extend((0..5).map(|i| (x[i] - expected[i]) / u[i]));
         residuals.iter().all(|one| one.is_finite()).then_some(residuals)
     };
@@ -120,27 +125,26 @@ fn fit(curve: &Curve, sensor: Sensor, start: &IdealRig, prior: &IdealRig) -> Opt
     Some((scene, uncertainty, best.chi_square))
 }
 
-/// Step from point to point of a backbone to which the effective constants are fitted: 48 of 192 points determine three.
-const BACKBONE_STRIDE: usize = 4;
+/// Points of a backbone to which the three effective constants are fitted.
+const EFFECTIVE_POINTS: usize = 48;
 
-/// The particle whose closed form has the exact force of the scene: harmonics of the host change only its constants.
-fn effective(scene: &IdealRig, sensor: Sensor, power: i32) -> Option<Particle> {
-    let linear = scene.linear();
-    let backbone: Vec<[f64; 3]> = scene.backbone(sensor)?.into_iter().step_by(BACKBONE_STRIDE).collect();
+/// The particle whose closed form has the exact force of a backbone: harmonics of the host change only its constants.
+fn effective(near: Particle, backbone: &[[f64; 3]], linear: Linear) -> Option<Particle> {
+    let stride = (backbone.len() / EFFECTIVE_POINTS).max(1);
     let particle = |x: &SVector<f64, 3>| {
         let [epsilon, b, r] = x.map(f64::exp).into();
-        Particle { epsilon, b, r: r / (1.0 + r), sensor }
+        Particle { epsilon, b, r: r / (1.0 + r), ..near }
     };
     let residuals = |x: &SVector<f64, 3>| {
         let particle = particle(x);
         let error = |point: &[f64; 3]| {
-            let error = particle.steady_motion(point[0]).force - linear.force_at_resonance(*point, power);
-            let error = error / (scene.epsilon * scene.b);
+            let error = particle.steady_motion(point[0]).force - linear.force_at_resonance(*point, power(near.sensor));
+            let error = error / (near.epsilon * near.b);
             [error.re, error.im]
         };
-        Some(backbone.iter().flat_map(error).collect())
+        Some(backbone.iter().step_by(stride).flat_map(error).collect())
     };
-    let start = SVector::from([scene.epsilon, scene.b, scene.r / (1.0 - scene.r)].map(f64::ln));
+    let start = SVector::from([near.epsilon, near.b, near.r / (1.0 - near.r)].map(f64::ln));
     LeastSquares::minimum(&Model(residuals), start, &(), LEAST_GAIN).map(|best| particle(&best.x))
 }
 
@@ -155,6 +159,40 @@ fn power(sensor: Sensor) -> i32 {
 impl Samples<'_> {
     fn record(&self, scene: &IdealRig) -> Option<Record> {
         Record::new(&self.signals, scene.linear(), power(self.sensor))
+    }
+}
+
+/// The samples of a record, and the periods of them that are read.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Response and base, m.
+    pub displacements: [Vec<f64>; 2],
+    /// As [`Signals::readings`].
+    pub readings: [Vec<f64>; 2],
+    /// Time between samples, s.
+    pub sample_time: f64,
+    /// What the response is.
+    pub sensor: Sensor,
+    /// The periods.
+    pub used: Vec<bool>,
+}
+
+impl Source {
+    /// The curve as a rig reads it that has this particle, a backbone, and a linear response.
+    pub(crate) fn read(&self, near: Particle, backbone: &[[f64; 3]], linear: Linear) -> Option<Curve> {
+        let signals = Signals {
+            response: &self.displacements[0],
+            base: &self.displacements[1],
+            readings: [&self.readings[0], &self.readings[1]],
+            sample_time: self.sample_time,
+        };
+        let record = Record::new(&signals, linear, power(self.sensor))?;
+        let particle = effective(near, backbone, linear)?;
+        let mut used = self.used.clone();
+        used.resize(record.periods.time.len(), false);
+        let scale = near.epsilon * near.b;
+        let (estimate, solution) = Estimate::of_periods(&record, &particle, scale, &used)?.fit()?;
+        estimate.curve(&solution)
     }
 }
 
@@ -179,7 +217,8 @@ fn passes(samples: &Samples, rough: &IdealRig, found: &mut BTreeSet<usize>) -> O
     let mut scene = rough_scene(&samples.record(rough)?, rough, samples.sensor);
     for pass in 1..=PASSES {
         let record = samples.record(&scene)?;
-        let particle = effective(&scene, samples.sensor, record.power)?;
+        let near = scene.particle(samples.sensor);
+        let particle = effective(near, &scene.backbone(samples.sensor)?, scene.linear())?;
         let scale = scene.epsilon * scene.b;
         let tolerance = TOLERANCES[usize::from(pass > 1)];
         let expected = Expected { particle, host: Complex64::ZERO, tolerance, scale };
@@ -208,6 +247,7 @@ fn passes(samples: &Samples, rough: &IdealRig, found: &mut BTreeSet<usize>) -> O
                 time: record.periods.time.clone(),
                 amplitude: record.periods.response.iter().map(|z| z.norm()).collect(),
                 motions,
+                read: near,
                 lag: estimate.lag,
                 innovations: solution.innovations,
                 passes: pass,

@@ -104,7 +104,7 @@ fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2], sensor: Senso
     let u = IdealRig::UNCERTAINTY;
     let scale = scene.epsilon * scene.b;
     let prior = [u[4] * scene.epsilon, 2.0 * u[0], 2.0 * u[1] * scene.zeta].map(|one| 1.0 / (2.0 * one * one));
-    let unit = Particle { epsilon: 1.0, b, r, sensor };
+    let unit = Particle::ideal([1.0, b, r], sensor);
     let steady: Vec<_> = windows
         .iter()
         .map(|window| unit.steady_motion(window.amplitude))
@@ -141,7 +141,7 @@ fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2], sensor: Senso
         };
         found = solution;
         found[0] = found[0].max(scene.epsilon / 3.0);
-        let particle = Particle { epsilon: found[0], b, r, sensor };
+        let particle = Particle::ideal([found[0], b, r], sensor);
         let expected = Expected {
             particle,
             host: Complex64::new(found[1], found[2]),

@@ -68,7 +68,7 @@ impl Prototype {
 
     fn particle(&self) -> Particle {
         let [_, _, r, b, epsilon] = self.truth;
-        Particle { epsilon, b, r, sensor: Sensor::Q1 }
+        Particle::ideal([epsilon, b, r], Sensor::Q1)
     }
 
     fn record(&self, [response, base]: &[Vec<f64>; 2]) -> Record {

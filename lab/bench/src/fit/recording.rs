@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 use thiserror::Error;
 use vines_estimate::Oscillations;
-use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Unidentified, identify};
+use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Source, Unidentified, identify};
 use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
 use vines_model::{Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
@@ -331,9 +331,21 @@ impl Recording {
             .filter(|(_, used)| **used)
             .map(|((time, amplitude), _)| [*time, *amplitude])
             .collect();
-        let curve = found.curve.resolved(POINT_RESOLUTION);
+        let (resolution, sensor) = (POINT_RESOLUTION, samples.sensor);
+        let curve = found.curve.resolved(resolution);
         let curve = curve.ok_or_else(|| self.without_curve(&Unidentified::default()))?;
-        Ok((MeasuredCurve { origin: origin.clone(), curve, periods }, stretches))
+        let source = Source {
+            displacements: [signals.response, signals.base].map(<[f64]>::to_vec),
+            readings: signals.readings.map(<[f64]>::to_vec),
+            sample_time: *sample_time,
+            sensor,
+            used: found.used,
+        };
+        let (origin, read) = (origin.clone(), found.read);
+        Ok((
+            MeasuredCurve { origin, curve, periods, source, read, resolution },
+            stretches,
+        ))
     }
 
     /// Refuses channels of which the response has no oscillation near the natural frequency, and channels that are swapped, or of which one has the
