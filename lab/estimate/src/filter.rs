@@ -101,7 +101,8 @@ impl Filter {
                 let duration = record.steps[k - 1];
                 transition = rotation(record.transition(duration)) + columns.feedback[k];
                 let moved = (record.linear.gain() * duration).norm_sqr();
-                process = 0.5 * moved * (process_share * columns.beyond[k - 1] + base[k] + base[k - 1]);
+                let of_base = base[k] + base[k - 1] + record.between[k - 1];
+                process = 0.5 * moved * (process_share * columns.beyond[k - 1] + of_base);
             }
             if !used[k] {
                 process += FORGET * noise[k];

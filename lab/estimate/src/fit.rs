@@ -70,16 +70,22 @@ impl<'a> Estimate<'a> {
     pub fn new(record: &'a Record, element: &'a dyn Element, scale: f64, used: &[bool]) -> Option<Self> {
         let response = &record.periods.response;
         let is_smooth = |(used, z): (&bool, &Complex64)| *used && element.is_smooth(z.norm());
-        let mut used: Vec<bool> = used.iter().zip(response).map(is_smooth).collect();
-        let first = Self::of_periods(record, element, scale, &used)?;
-        used.iter_mut()
-            .zip(&first.columns.lost)
-            .for_each(|(used, lost)| *used &= !lost);
+        let smooth: Vec<bool> = used.iter().zip(response).map(is_smooth).collect();
+        let mut one = Self::of_periods(record, element, scale, &smooth)?;
+        let kept: Vec<bool> = smooth
+            .iter()
+            .zip(&one.columns.lost)
+            .map(|(used, lost)| *used && !lost)
+            .collect();
         // The drift of a fundamental is known between two others of the same motion only.
-        let kept = used.clone();
-        let neighbours = |k: usize| k > 0 && kept[k - 1] && kept.get(k + 1).is_some_and(|next| *next);
-        used.iter_mut().enumerate().for_each(|(k, used)| *used &= neighbours(k));
-        Self::of_periods(record, element, scale, &used)
+        let has_neighbours = |k: usize| k > 0 && kept[k - 1] && kept[k] && kept.get(k + 1).is_some_and(|next| *next);
+        one.used = (0..kept.len()).map(has_neighbours).collect();
+        one.columns.keep_feedback(&one.used);
+        one.has_enough().then_some(one)
+    }
+
+    fn has_enough(&self) -> bool {
+        2 * self.used.iter().filter(|used| **used).count() >= FUNCTIONS
     }
 
     /// With exactly these periods.
@@ -109,9 +115,8 @@ impl<'a> Estimate<'a> {
         let seconds = coefficients.windows(3).map(|c| (c[0] - 2.0 * c[1] + c[2]).norm_sqr());
         let least = SHAPE * (seconds.sum::<f64>() / (FUNCTIONS - 2) as f64).sqrt() / scale;
         let own = coefficients.clone();
-        let enough = 2 * used.iter().filter(|used| **used).count() >= FUNCTIONS;
         let hyper = [0.03, 0.1, 1.0];
-        enough.then_some(Self {
+        let one = Self {
             record,
             element,
             scale,
@@ -123,7 +128,8 @@ impl<'a> Estimate<'a> {
             own,
             least,
             columns,
-        })
+        };
+        one.has_enough().then_some(one)
     }
 
     /// The path as given, without the errors of it, and no curvature expected of the force: for comparison.

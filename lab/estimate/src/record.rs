@@ -114,6 +114,9 @@ pub struct Record {
     pub departure: Vec<Complex64>,
     /// From the middle of each period to that of the next one, s.
     pub steps: Vec<f64>,
+    /// Mean square of what the base may do between its samples on the way to the next period, m²: its amplitude may change in a straight line, at one
+    /// sample, or at once, which is a pulse of any phase.
+    pub between: Vec<f64>,
 }
 
 /// Periods over which the variance of noise is averaged: a hundred degrees of freedom each, so that its own error of 3 % does not count.
@@ -155,17 +158,11 @@ impl Record {
         }
         periods.noise = averaged(&periods.noise);
         periods.base_noise = averaged(&periods.base_noise);
-        // Between samples an amplitude may change in a straight line, at one of them, or at once: then it is a pulse at any phase.
-        for k in 1..periods.base.len() {
-            let [change, samples] = [
-                periods.base[k].norm() - periods.base[k - 1].norm(),
-                (periods.time[k] - periods.time[k - 1]) / sample_time,
-            ];
-            let unknown = (0.5 * change / samples).powi(2);
-            periods.base_noise[k - 1..=k]
-                .iter_mut()
-                .for_each(|variance| *variance += unknown);
-        }
+        let unknown = |k: usize| {
+            let change = periods.base[k + 1].norm() - periods.base[k].norm();
+            0.5 * (change * sample_time / (periods.time[k + 1] - periods.time[k])).powi(2)
+        };
+        let between = (0..periods.base.len() - 1).map(unknown).collect();
         let departure = periods
             .response
             .iter()
@@ -173,7 +170,7 @@ impl Record {
             .map(|(z, l)| z - l)
             .collect();
         let steps = periods.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        Some(Self { linear, power, periods, departure, steps })
+        Some(Self { linear, power, periods, departure, steps, between })
     }
 
     /// The free motion of the envelope over a time, in the frame of omega0.
