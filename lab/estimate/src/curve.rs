@@ -31,8 +31,6 @@ pub struct Curve {
     pub expected: DVector<f64>,
     /// Change of the measured values where the base reads too much, over the share of it.
     pub by_gain: DVector<f64>,
-    /// Twice the negative logarithm of the likelihood of what agrees with all rows, without constants.
-    pub deviance: f64,
 }
 
 /// Drive and frequency of phase resonance at some amplitudes.

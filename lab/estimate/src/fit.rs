@@ -58,8 +58,6 @@ pub struct Solution {
     normal: Cholesky<f64, Dyn>,
     /// The matrix and the right-hand side without priors, and how the latter changes with the gain of the base.
     information: (DMatrix<f64>, DMatrix<f64>),
-    /// Twice the negative logarithm of the likelihood with all unknowns 0, without constants.
-    without: f64,
     /// Innovations that the unknowns leave, with variance 1.
     pub innovations: Vec<f64>,
 }
@@ -172,7 +170,6 @@ impl<'a> Estimate<'a> {
             unknowns,
             normal,
             information: (information, right),
-            without,
             innovations,
         })
     }
@@ -249,7 +246,7 @@ impl<'a> Estimate<'a> {
     pub fn curve(&self, solution: &Solution) -> Option<Curve> {
         let n = 2 * self.basis.size;
         let covariance = solution.normal.inverse().view((0, 0), (n, n)).into_owned();
-        let (information, mut values, deviance) = solution.of_the_force(n + 2)?;
+        let (information, mut values) = solution.of_the_force(n + 2)?;
         for (part, lag) in [self.lag.re, self.lag.im].into_iter().enumerate() {
             let moved = values.column(0) + information.column(n + part) * lag;
             values.set_column(0, &moved);
@@ -264,7 +261,6 @@ impl<'a> Estimate<'a> {
             information,
             expected: values.column(0).into_owned(),
             by_gain: values.column(1).into_owned(),
-            deviance,
         }
         .with_errors(errors)
     }
@@ -272,8 +268,8 @@ impl<'a> Estimate<'a> {
 
 impl Solution {
     /// Rows of what the record says of the first `n` unknowns without their prior, with variance 1, and their values, with their change by the gain of the
-    /// base: the equations, without the other unknowns. Last, the deviance of what agrees with them.
-    fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DMatrix<f64>, f64)> {
+    /// base: the equations, without the other unknowns.
+    fn of_the_force(&self, n: usize) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (all, right) = &self.information;
         let rest = all.nrows() - n;
         // The others keep their prior, which the equations with it contain.
@@ -282,18 +278,14 @@ impl Solution {
         let inverse = with_prior.cholesky()?;
         let cross = all.view((n, 0), (rest, n)).into_owned();
         let matrix = all.view((0, 0), (n, n)) - cross.tr_mul(&inverse.solve(&cross));
-        let of_others = right.rows(n, rest).into_owned();
-        let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&of_others));
+        let known = right.rows(0, n) - cross.tr_mul(&inverse.solve(&right.rows(n, rest).into_owned()));
         let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, 30 * n)?;
         let largest = eigen.eigenvalues.max();
         let kept: Vec<usize> = (0..n).filter(|i| eigen.eigenvalues[*i] > ROUNDING * largest).collect();
         let row = |i: &usize| eigen.eigenvectors.column(*i).transpose() * eigen.eigenvalues[*i].sqrt();
         let value = |i: &usize| eigen.eigenvectors.column(*i).tr_mul(&known) / eigen.eigenvalues[*i].sqrt();
         let [rows, values]: [Vec<_>; 2] = [kept.iter().map(row).collect(), kept.iter().map(value).collect()];
-        let values = DMatrix::from_rows(&values);
-        let of_others = of_others.column(0).dot(&inverse.solve(&of_others).column(0));
-        let deviance = self.without - of_others - values.column(0).norm_squared();
-        Some((DMatrix::from_rows(&rows), values, deviance))
+        Some((DMatrix::from_rows(&rows), DMatrix::from_rows(&values)))
     }
 }
 

@@ -151,8 +151,6 @@ pub struct Fit {
     speed: f64,
     /// Chi-square.
     pub chi_square: f64,
-    /// By how much less likely the records are as the hypothesis reads them than as the ideal cavity does, as chi-square.
-    pub unlikely: f64,
     /// Its degrees of freedom.
     pub degrees: usize,
     /// Residuals of the points over their standard uncertainties: response, frequency, drive.
@@ -473,14 +471,15 @@ impl Data {
                 None => not_fitted.push(hypothesis),
             }
         }
-        // What its own data reject is no measure of the others.
-        let total = |fit: &Fit| fit.chi_square + fit.unlikely;
-        let possible = fits.iter().filter(|fit| fit.rejection().is_none());
-        let best = possible.min_by(|one, other| total(one).total_cmp(&total(other)));
-        let best = best.map(|fit| (total(fit), fit.degrees));
+        // Chi-squares of the same data: each hypothesis reads a record for itself. What its own data reject is no measure of the others.
+        let comparable = fits
+            .iter()
+            .filter(|fit| self.curves.is_empty() && fit.rejection().is_none());
+        let best = comparable.min_by(|one, other| one.chi_square.total_cmp(&other.chi_square));
+        let best = best.map(|fit| (fit.chi_square, fit.degrees));
         for fit in &mut fits {
             let exceeds = best.and_then(|(least, degrees)| {
-                let (excess, difference) = (total(fit) - least, fit.degrees.abs_diff(degrees).max(1) as f64);
+                let (excess, difference) = (fit.chi_square - least, fit.degrees.abs_diff(degrees).max(1) as f64);
                 let is_excess = probability(excess, difference).is_some_and(|p| p < EXCLUDED);
                 is_excess.then(|| format!("chi-square exceeds the smallest by {excess:.0}"))
             });
@@ -509,10 +508,8 @@ impl Data {
                 Some(MeasuredCurve { curve, read, ..one.clone() })
             });
             let data = Self { curves: curves.collect::<Option<_>>()?, ..self.clone() };
-            let deviance = |data: &Self| data.curves.iter().map(|one| one.curve.deviance).sum::<f64>();
             let problem = Problem { speed: fit.speed, ..data.problem(fit.hypothesis, fit.x) };
-            let next = problem.best(std::iter::once(fit.x))?;
-            Some(Fit { unlikely: deviance(&data) - deviance(self), ..next })
+            problem.best(std::iter::once(fit.x))
         };
         let mut fit = first;
         for _ in 0..READINGS {
@@ -842,7 +839,6 @@ impl Problem<'_> {
             has_friction: self.is_free(6),
             speed: self.speed,
             chi_square: minimum.chi_square,
-            unlikely: 0.0,
             degrees: self.equations().saturating_sub(free),
             residuals: minimum.residuals.as_chunks().0[..count].to_vec(),
             channels,
