@@ -540,6 +540,31 @@ fn a_recording_with_friction_is_told_by_a_ruler_and_without_one_the_range_holds_
 }
 
 #[test]
+fn a_recording_shows_a_wrong_gain_of_the_reference_and_with_a_ruler_a_law_of_restitution() {
+    let mut record = recording();
+    record.drive.iter_mut().for_each(|value| *value *= 1.01);
+    let found = of_recording(record, &wrong_scene(), &["mu=0"]);
+    let law = Restitution::Viscoelastic(0.4);
+    let cavity = Cavity { restitution: [Some(law); 2], ..Cavity::IDEAL };
+    let known = ["b=0.0095±0.00002", "epsilon=0.009231±0.00002"];
+    let by_law = of_recording(recorded_on(Parameters { cavity, ..RIG }, ""), &wrong_scene(), &known);
+    for (found, hypothesis, strength, quantities) in [
+        (found, Hypothesis::Reference, 0.01, &FITTED[..]),
+        (by_law, Hypothesis::Viscoelastic, 0.4, &[Quantity::F0, Quantity::Zeta]),
+    ] {
+        assert!(row(&found, Hypothesis::Ideal).excluded.is_some(), "{found:?}");
+        let fit = row(&found, hypothesis);
+        assert!(fit.excluded.is_none(), "{fit:?}");
+        let off = fit.strength().unwrap();
+        assert!(
+            (off.value - strength).abs() < 3.0 * off.uncertainty && off.uncertainty < 0.1 * strength,
+            "{off:?}"
+        );
+        assert!(quantities.iter().all(|one| pull(fit, *one).abs() < 3.0), "{fit:?}");
+    }
+}
+
+#[test]
 fn a_recording_that_contradicts_every_hypothesis_is_rejected_with_its_times() {
     let mut record = recording();
     // From the middle on the sensor reads 0.5 % too much.

@@ -4,8 +4,8 @@
 //! its standard uncertainties; a record by the rows of what it says of the curve ([`Curve::residuals`]); what is known from elsewhere by a row of its
 //! own. The parameters minimise the sum of squares, chi-square (Levenberg and Marquardt), and its second derivative is the inverse of their covariance.
 //!
-//! A hypothesis is excluded where a channel rejects it, or where its chi-square exceeds the smallest one by more than chance allows. What remains is
-//! possible, and the range of a parameter is that over what remains.
+//! A hypothesis is excluded where a channel rejects it, or, of points, where its chi-square exceeds the smallest one by more than chance allows; of a
+//! record each has a reading of its own. What remains is possible, and the range of a parameter is that over what remains.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
