@@ -549,7 +549,7 @@ fn a_recording_shows_a_wrong_gain_of_the_reference_and_with_a_ruler_a_law_of_res
     let known = ["b=0.0095±0.00002", "epsilon=0.009231±0.00002"];
     let by_law = of_recording(recorded_on(Parameters { cavity, ..RIG }, ""), &wrong_scene(), &known);
     for (found, hypothesis, strength, quantities) in [
-        (found, Hypothesis::Reference, 0.01, &FITTED[..]),
+        (found, Hypothesis::Reference, 0.01, FITTED),
         (by_law, Hypothesis::Viscoelastic, 0.4, &[Quantity::F0, Quantity::Zeta]),
     ] {
         assert!(row(&found, Hypothesis::Ideal).excluded.is_some(), "{found:?}");
