@@ -8,6 +8,7 @@
 //! record each has a reading of its own. What remains is possible, and the range of a parameter is that over what remains.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::sync::Arc;
 
 use lovines::Parameters;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -27,7 +28,7 @@ use crate::motions::{AMPLITUDES, Goal, Motions, Place, backbone, uncertainties};
 use crate::particle::Particle;
 use crate::points::MeasuredPoint;
 use crate::quantity::{Known, Quantity, STEP, UNKNOWNS, Unknowns, gradient, moved, unknowns};
-use crate::record::Source;
+use crate::record::{PASSES, STILL, Source};
 
 /// What a record says.
 #[derive(Debug, Clone)]
@@ -39,7 +40,7 @@ pub struct MeasuredCurve {
     /// Times, s, and amplitudes of the response, m, of the periods that were used.
     pub periods: Vec<[f64; 2]>,
     /// What it was read from.
-    pub source: Source,
+    pub source: Arc<Source>,
     /// The particle with which it was read.
     pub read: Particle,
     /// Relative error of the curve beside noise.
@@ -77,8 +78,6 @@ const WIDTHS: usize = 8;
 const THEORY: f64 = 0.04;
 /// Gain of a further step, relative to one and chi-square, at which a minimum counts as found: of a curve in closed form, and of one of motions.
 const LEAST_GAIN: [f64; 2] = [1e-9, 1e-4];
-/// How often a hypothesis reads records again: with the particle that its first fit found, and with that of the second.
-const READINGS: usize = 2;
 /// Amplitudes that count as equal to one of a record, relative.
 const ASIDE: f64 = 0.03;
 
@@ -466,8 +465,8 @@ impl Data {
                 false => vec![start],
                 true => vec![with_friction, with(start, 0.0), with(unknowns(expected), TYPICAL)],
             };
-            match problem.best(starts.into_iter()) {
-                Some(fit) => fits.push(self.read_again(fit)),
+            match problem.best(starts.into_iter()).and_then(|fit| self.read_again(fit)) {
+                Some(fit) => fits.push(fit),
                 None => not_fitted.push(hypothesis),
             }
         }
@@ -488,10 +487,10 @@ impl Data {
         Ok(Hypotheses { fits, not_fitted, has_scene: self.scene.is_some() })
     }
 
-    /// The fit to the records as the hypothesis itself reads them: with its particle and its linear response. The fit to the first reading, if that fails.
-    fn read_again(&self, first: Fit) -> Fit {
+    /// The fit to the records as the hypothesis itself reads them: with its particle and its linear response. `None` if these have no curve then.
+    fn read_again(&self, first: Fit) -> Option<Fit> {
         if self.curves.is_empty() || !first.hypothesis.is_cavity() {
-            return first;
+            return Some(first);
         }
         let again = |fit: &Fit| {
             let problem = Problem { speed: fit.speed, ..self.problem(fit.hypothesis, fit.x) };
@@ -512,10 +511,18 @@ impl Data {
             problem.best(std::iter::once(fit.x))
         };
         let mut fit = first;
-        for _ in 0..READINGS {
-            fit = again(&fit).unwrap_or(fit);
+        for _ in 0..PASSES {
+            let next = again(&fit)?;
+            let change = |i: usize| (next.x[i] - fit.x[i]).abs() / next.covariance[(i, i)].max(0.0).sqrt();
+            let is_still = (0..UNKNOWNS)
+                .filter(|i| next.x[*i] != fit.x[*i])
+                .all(|i| change(i) < STILL);
+            fit = next;
+            if is_still {
+                break;
+            }
         }
-        fit
+        Some(fit)
     }
 
     /// Whether it is known that something does not act.

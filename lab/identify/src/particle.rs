@@ -138,7 +138,11 @@ impl Particle {
     fn loss(&self, mean: f64) -> [f64; 3] {
         let [mut r, mut exponent] = [self.r, 0.0];
         for _ in 0..ROUNDS {
+            let before = r;
             [r, exponent] = self.restitution(2.0 * mean / (1.0 + r));
+            if r == before {
+                break;
+            }
         }
         let slope = r * exponent / (mean * (1.0 + exponent * r / (1.0 + r)));
         [
@@ -160,8 +164,11 @@ impl Particle {
     fn at_fold(&self) -> [f64; 2] {
         let mut speed = 2.0 / PI;
         for _ in 0..ROUNDS {
-            let ratio = self.loss(speed)[0];
+            let (before, ratio) = (speed, self.loss(speed)[0]);
             speed = (FRAC_PI_2 - ratio * FRAC_PI_2 * self.friction) / (ratio * ratio + FRAC_PI_2 * FRAC_PI_2);
+            if speed == before {
+                break;
+            }
         }
         let [cosine, sine] = self.place(speed);
         [speed, cosine.hypot(sine)]
@@ -180,7 +187,8 @@ impl Particle {
 
     /// The steady motion at an amplitude, m, and its lag: minus the response to a slow growth of ln A, to the first order, over the slope.
     pub fn steady_motion(&self, amplitude: f64) -> Steady {
-        let one = self.at(amplitude);
+        // Below the fold there are no motions that have a frequency.
+        let one = self.at(amplitude.max(NEAR_FOLD * self.fold()));
         let Self { epsilon, b, friction, sensor, .. } = one;
         let [slowest, fold] = one.at_fold();
         let c = (amplitude / b).max(NEAR_FOLD * fold);
@@ -188,10 +196,13 @@ impl Particle {
         // Mean speed.
         let mut speed = slowest;
         for _ in 0..ROUNDS {
-            let ratio = one.loss(speed)[0];
+            let (before, ratio) = (speed, one.loss(speed)[0]);
             let (k, half) = (ratio * ratio + FRAC_PI_2 * FRAC_PI_2, FRAC_PI_2 - ratio * by_friction);
             let root = half * half - k * (1.0 + by_friction * by_friction - c * c);
             speed = (half + root.max(0.0).sqrt()) / k;
+            if speed == before {
+                break;
+            }
         }
         let ([cosine, sine], [ratio, ratio_slope, rebound]) = (one.place(speed), one.loss(speed));
         // By the logarithm of the amplitude.
@@ -345,6 +356,19 @@ impl Element for Particle {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn below_the_fold_the_motion_is_that_near_it_whatever_the_polynomial_of_the_frequency_is_there() {
+        let ideal = Particle::ideal([0.01, 0.01, 0.6], Sensor::Q1);
+        let frequency = [-3.0, -2.0, -0.5, -0.05];
+        let particle = Particle { law: Law::Plastic, friction: 0.02, frequency, ..ideal };
+        let [near, rest] = [1.0, 1e-6].map(|share| particle.steady_motion(share * particle.fold()));
+        assert!(
+            near.lag.is_finite() && rest.lag == near.lag && rest.force == near.force,
+            "{rest:?}"
+        );
+        assert!(!rest.exists);
+    }
 
     #[test]
     fn the_lag_is_that_of_the_map_along_a_response_that_grows_slowly() {

@@ -63,10 +63,10 @@ impl Identified {
     }
 }
 
-/// Most passes.
-const PASSES: usize = 6;
-/// Change of f0 and zeta, in standard uncertainties, below which another pass changes nothing.
-const STILL: f64 = 0.1;
+/// Most passes, and most readings by a hypothesis.
+pub(crate) const PASSES: usize = 6;
+/// Change of an unknown, in standard uncertainties, below which another pass or reading changes nothing.
+pub(crate) const STILL: f64 = 0.1;
 /// Fewest periods: with fewer the curve is the prior's.
 const FEWEST_PERIODS: usize = 30;
 /// Gain of a further step, relative to one and chi-square, at which the minimum counts as found.

@@ -4,6 +4,7 @@
 //! channels are made displacements, and what is no measurement of a rig near resonance is refused.
 
 use std::f64::consts::{SQRT_2, TAU};
+use std::sync::Arc;
 
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -334,13 +335,13 @@ impl Recording {
         let (resolution, sensor) = (POINT_RESOLUTION, samples.sensor);
         let curve = found.curve.resolved(resolution);
         let curve = curve.ok_or_else(|| self.without_curve(&Unidentified::default()))?;
-        let source = Source {
+        let source = Arc::new(Source {
             displacements: [signals.response, signals.base].map(<[f64]>::to_vec),
             readings: signals.readings.map(<[f64]>::to_vec),
             sample_time: *sample_time,
             sensor,
             used: found.used,
-        };
+        });
         let (origin, read) = (origin.clone(), found.read);
         Ok((
             MeasuredCurve { origin, curve, periods, source, read, resolution },
