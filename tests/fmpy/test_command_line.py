@@ -109,10 +109,10 @@ def test_fit_reads_recordings_and_says_what_is_wrong_with_one(call, tmp_path):
         assert abs(narrow["value"] - truth) < 4 * narrow["uncertainty"] < 0.1 * truth
     lines = (tmp_path / "run.csv").read_text().splitlines(keepends=True)
     (tmp_path / "gap.csv").write_text("".join(lines[:3000] + lines[3100:]))
-    (tmp_path / "record.mat").touch()
+    (tmp_path / "a record.mat").touch()
     for arguments, words in (
         (["gap.csv"], "gap.csv, row 3001: the time goes from"),
-        (["record.mat"], "`python -m vines fit record.mat`"),
+        (["a record.mat"], "`python -m vines fit 'a record.mat'`"),
         (["run.csv", "--response", "z"], "run.csv has no channel `z`; it has time, response"),
         (["run.csv", "--drive", "reference:-1", "--set", "resonance.sensor=v"], "wrong sign"),
         (["run.csv", "--drive", "response", "--response", "reference", "--set", "resonance.sensor=v"], "swapped"),

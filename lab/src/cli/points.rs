@@ -15,6 +15,8 @@ use vines::linear::MeasuredLinear;
 use vines::numerics::Estimate;
 use vines::scene::{Measurand, Name, Scene, phase_target};
 
+use super::shell::quoted;
+
 /// Quantities of a point, the columns that have them, and their units.
 const COLUMNS: [(&str, &str, &str); 6] = [
     ("f", "f_Hz", "Hz"),
@@ -117,8 +119,9 @@ pub(super) fn plain(path: &Path) -> Result<Source, ArgumentError> {
     let file = path.display();
     let python = |reason: &str| {
         ArgumentError::from(format!(
-            "{reason}\n`python -m vines fit {file}` with the same options reads other tables, and MAT, HDF5, TDMS, UFF58 and LVM; install it with \
-             `pip install './python[io]'`"
+            "{reason}\n`python -m vines fit {}` with the same options reads other tables, and MAT, HDF5, TDMS, UFF58 and LVM; install it with \
+             `pip install './python[io]'`",
+            quoted(&path.to_string_lossy())
         ))
     };
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
