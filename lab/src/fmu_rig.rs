@@ -3,16 +3,16 @@
 use std::path::Path;
 
 use vines_bench::rig::{Measured, has_friction};
-use vines_bench::scene::{Excitation, Measurand, Scene, Sensor, Structure};
+use vines_bench::scene::{Measurand, Reference, Scene, Sensor, Structure};
 use vines_fmu::{Asked, FmuError, FmuRig};
 
 /// The amplitude of a drive, its signal, and the reference, with their unit.
 fn drive_names(structure: Option<&Structure>) -> [(&'static str, &'static str); 3] {
     match structure.map(|structure| (structure.excitation, structure.shaker.is_some())) {
-        Some((Excitation::Force, true)) => [("u_amplitude", "V"), ("u", "V"), ("force", "N")],
-        Some((Excitation::Force, false)) => [("F_amplitude", "N"), ("F", "N"), ("force", "N")],
-        Some((Excitation::Base, true)) => [("u_amplitude", "V"), ("u", "V"), ("q[table]", "m")],
-        Some((Excitation::Base, false)) | None => [("E", "m"), ("e", "m"), ("base", "m")],
+        Some((Reference::Force, true)) => [("u_amplitude", "V"), ("u", "V"), ("force", "N")],
+        Some((Reference::Force, false)) => [("F_amplitude", "N"), ("F", "N"), ("force", "N")],
+        Some((Reference::Base, true)) => [("u_amplitude", "V"), ("u", "V"), ("q[table]", "m")],
+        Some((Reference::Base, false)) | None => [("E", "m"), ("e", "m"), ("base", "m")],
     }
 }
 

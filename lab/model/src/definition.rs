@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use lovines::Excitation;
 use serde::{Deserialize, Serialize};
 
 /// Reference, sensor and phase that define resonance. The default is the definition of the study.
@@ -81,14 +82,14 @@ impl Measurand {
     }
 }
 
-/// What the phase of the response refers to.
+/// What the phase of the response refers to, and what drives a structure.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Reference {
     /// The base displacement e.
     #[default]
     Base,
-    /// The force k e + c e' that the base exerts on the primary mass.
+    /// The force k e + c e' that the base exerts on the primary mass, or a force at a point of a structure.
     Force,
 }
 
@@ -194,6 +195,22 @@ impl Reference {
         match self {
             Reference::Base => "e",
             Reference::Force => "the force",
+        }
+    }
+
+    /// SI unit of a displacement of the base, or of a force.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Reference::Base => "m",
+            Reference::Force => "N",
+        }
+    }
+
+    /// What drives the host of a plant with this reference.
+    pub fn excitation(self) -> Excitation {
+        match self {
+            Reference::Base => Excitation::Base,
+            Reference::Force => Excitation::Force,
         }
     }
 

@@ -61,7 +61,7 @@ pub use plant::plant_keys;
 pub use record::{BackboneSettings, RecordSettings};
 pub use shaker::{ARMATURE, Channel, Limits, Release, SceneShaker, TABLE};
 pub use shaker::{PLACES, frequencies};
-pub use structure::{Excitation, Structure, StructureMode};
+pub use structure::{Structure, StructureMode};
 pub use vines_model::{Definition, Dimensionless, Measurand, Reference, Sensor};
 pub use vines_rig::{Name, Names};
 
@@ -122,15 +122,8 @@ impl Scene {
     /// What counts as resonance of the oscillator or the driven mode, at the phase target of the controller. A force on a structure is what spring and damper of the oscillator pass on; its
     /// sensors are those of [`Scene::resonance`].
     pub fn definition(&self) -> Definition {
-        let by_force = self
-            .structure
-            .as_ref()
-            .is_some_and(|one| one.excitation == Excitation::Force);
-        let reference = if by_force {
-            Reference::Force
-        } else {
-            self.resonance.reference
-        };
+        let structure = self.structure.as_ref();
+        let reference = structure.map_or(self.resonance.reference, |one| one.excitation);
         let phase = self.controller.phase_target.to_radians();
         Definition { reference, phase, ..self.resonance }
     }

@@ -5,7 +5,7 @@ use vines::cells;
 use vines::experiment::ExperimentError;
 use vines::fmu::{FmuController, FmuRig};
 use vines::loop_check::{CheckedChannel, CheckedQuantity, LoopCheck, Verdict, check};
-use vines::scene::{Excitation, Scene};
+use vines::scene::{Reference, Scene};
 use vines::table::{Table, number, with_uncertainty};
 
 use super::failure::Failure;
@@ -95,7 +95,7 @@ fn unmeasured(checked: &LoopCheck, scene: &Scene) -> &'static str {
 /// The words of a check; where a force drives, those of a force.
 pub(super) fn named(text: &str, scene: &Scene) -> String {
     match &scene.structure {
-        Some(structure) if structure.excitation == Excitation::Force => text
+        Some(structure) if structure.excitation == Reference::Force => text
             .replace(
                 "whether the base moves the structure through its spring",
                 "the drive point",
@@ -135,7 +135,7 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
         text += &format!("Different from the scene: {name} is {measured} {unit}, not {expected}; {consequence}.\n");
     }
     let symbol = match scene.structure.as_ref().map(|structure| structure.excitation) {
-        Some(Excitation::Force) => "F",
+        Some(Reference::Force) => "F",
         _ => "E",
     };
     let unit = scene.units().reference.symbol;

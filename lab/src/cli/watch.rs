@@ -22,7 +22,7 @@ use vines::numerics::equally_spaced;
 use vines::record::Sample;
 use vines::regime::Impact;
 use vines::rig::{Command, Controller, ControllerError, Move, Rig, Sensors};
-use vines::scene::{Excitation, Measurand, Scene, Sensor, Structure};
+use vines::scene::{Measurand, Reference, Scene, Sensor, Structure};
 use vines::survey::structure_backbone;
 
 use super::failure::Failure;
@@ -329,8 +329,8 @@ fn host(scene: &Scene, structure: &Structure) -> Value {
         omegas.map(at).collect::<Vec<_>>()
     };
     let title = match drive {
-        Excitation::Force => "Drop-out: the force at a constant command, without impacts",
-        Excitation::Base => "Drop-out: the displacement of the table at a constant command, without impacts",
+        Reference::Force => "Drop-out: the force at a constant command, without impacts",
+        Reference::Base => "Drop-out: the displacement of the table at a constant command, without impacts",
     };
     json!({
         "drive": drive,

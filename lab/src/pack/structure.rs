@@ -13,7 +13,7 @@ use phase_lock::Value;
 use serde_json::json;
 
 use super::{Component, PackError, START_PARAMETERS, lock, parameter_set};
-use crate::scene::{ARMATURE, Channel, Excitation, Scene, SceneShaker, Structure, TABLE};
+use crate::scene::{ARMATURE, Channel, Reference, Scene, SceneShaker, Structure, TABLE};
 use crate::table::Table;
 
 /// `modelIdentifier`.
@@ -84,10 +84,10 @@ fn page(structure: &Structure, step: f64) -> Cow<'static, str> {
     });
     let head = "frequency, Hz | damping ratio | drive | mass-normalised shape, 1/sqrt(kg)";
     let mut drive = match structure.excitation {
-        Excitation::Base => {
+        Reference::Base => {
             "The displacement of its base drives it; <em>drive</em> is the participation factor, sqrt(kg).".to_owned()
         }
-        Excitation::Force => "A force drives it; <em>drive</em> is the shape at the force's point, 1/sqrt(kg).".into(),
+        Reference::Force => "A force drives it; <em>drive</em> is the shape at the force's point, 1/sqrt(kg).".into(),
     };
     if structure.shaker.is_some() {
         drive += &format!(
@@ -228,8 +228,8 @@ impl DriveKind {
     fn of(structure: &Structure) -> Self {
         match (&structure.shaker, structure.excitation) {
             (Some(_), _) => Self::Command,
-            (None, Excitation::Base) => Self::Base,
-            (None, Excitation::Force) => Self::Force,
+            (None, Reference::Base) => Self::Base,
+            (None, Reference::Force) => Self::Force,
         }
     }
 

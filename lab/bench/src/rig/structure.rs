@@ -5,7 +5,7 @@ use vines_model::Sensor;
 
 use super::oscillator::of_plant;
 use super::{Clock, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
-use vines_scene::scene::{Excitation, Release, SceneShaker, Structure};
+use vines_scene::scene::{Reference, Release, SceneShaker, Structure};
 
 /// A simulated structure. It is driven with the displacement of its base, m, a force, N, or the command of its shaker, V. It reads the displacement at
 /// the sensor, m, and the displacement of the base or the force.
@@ -158,8 +158,8 @@ impl SimulatedStructure {
             return plant.base_displacement();
         };
         let row = match self.structure.excitation {
-            Excitation::Base => &rows.end,
-            Excitation::Force => &rows.force,
+            Reference::Base => &rows.end,
+            Reference::Force => &rows.force,
         };
         plant.point(row)[0]
     }

@@ -11,7 +11,7 @@ use vines_bench::experiment::ExperimentError;
 use vines_bench::fit::{MeasuredPoint, contradiction};
 use vines_bench::loop_check::{CheckedQuantity, Verdict, check};
 use vines_bench::rig::Simulated;
-use vines_bench::scene::{Excitation, Scene, SceneError, Structure, Units};
+use vines_bench::scene::{Reference, Scene, SceneError, Structure, Units};
 use vines_bench::survey::{Survey, structure_backbone, without_other_modes};
 use vines_model::numerics::Estimate;
 use vines_model::orbit::{Orbit, StructureOrbit};
@@ -115,7 +115,7 @@ fn the_driven_mode_of_a_table_is_the_oscillator_of_knowledge_and_plan() {
     let scene = beam("").unwrap();
     let structure = scene.structure.as_ref().unwrap();
     assert_eq!(structure.points, ["middle", "root", "tip"]);
-    assert_eq!(structure.excitation, Excitation::Force);
+    assert_eq!(structure.excitation, Reference::Force);
     let knowledge = scene.knowledge();
     assert!((knowledge.linear.omega0 / (TAU * 8.8156) - 1.0).abs() < 1e-14);
     assert!((knowledge.linear.damping_rate / (0.006 * TAU * 8.8156) - 1.0).abs() < 1e-14);
@@ -525,8 +525,8 @@ impl Modal<'_> {
         self.sum(|n| {
             let mode = &self.0.modes[n];
             let by = match self.0.excitation {
-                Excitation::Force => Complex::from(1.0),
-                Excitation::Base => Complex::new(mode.omega.powi(2), 2.0 * mode.zeta * mode.omega * self.1),
+                Reference::Force => Complex::from(1.0),
+                Reference::Base => Complex::new(mode.omega.powi(2), 2.0 * mode.zeta * mode.omega * self.1),
             };
             mode.shape[to] * mode.drive * by
         })

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Excitation, Reference, Scene, option};
+use super::{Reference, Scene, option};
 
 settings! {
     /// The stages between the rig and the controller; each can be switched off.
@@ -54,7 +54,7 @@ impl Scene {
         let [response, reference] = self.resonance.measurands().map(|measurand| measurand.unit());
         match self.definition().reference {
             Reference::Base => [response, reference],
-            Reference::Force => [response, Excitation::Force.unit()],
+            Reference::Force => [response, Reference::Force.unit()],
         }
     }
 

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use lovines::{Drive, Plant, State, StructureState};
 
 use super::controller::in_degrees;
-use super::{Excitation, Measurand, Reference, Scene, SceneError, Sensor, Structure};
+use super::{Measurand, Reference, Scene, SceneError, Sensor, Structure};
 
 /// What is allowed of a number, which must be finite.
 pub(super) enum Range {
@@ -231,7 +231,7 @@ fn quantity_of_v(scene: &Scene) -> Option<String> {
 /// Only the sensor of a base reads a velocity or an acceleration.
 fn quantity_of_reference(scene: &Scene) -> Option<String> {
     let name = derivative(scene.resonance.reference_quantity)?;
-    let is_force = |one: &Structure| one.excitation == Excitation::Force;
+    let is_force = |one: &Structure| one.excitation == Reference::Force;
     let reason = if scene.resonance.reference == Reference::Force {
         "with resonance.reference = \"force\": the force k e + c e' follows from the displacement of the base; take the reference \"base\", or the \
          quantity \"displacement\""

@@ -11,7 +11,7 @@ use vines_model::Dimensionless;
 
 use super::checks::{Range, Row};
 use super::shaker::ShakerSection;
-use super::{Excitation, SceneError, Structure, Unit};
+use super::{Reference, SceneError, Structure, Unit};
 
 /// The section as written: rows of the plant's table, or dimensionless numbers.
 #[derive(Debug, Clone, Default)]
@@ -103,7 +103,7 @@ impl PlantSection {
 
     /// The oscillator as a structure with one mode, on the table of a shaker or driven by its force.
     pub(super) fn take_oscillator(&mut self, origin: &str, shaker: &ShakerSection) -> Result<Structure, SceneError> {
-        let excitation = shaker.table_mass.map_or(Excitation::Force, |_| Excitation::Base);
+        let excitation = shaker.table_mass.map_or(Reference::Force, |_| Reference::Base);
         let mut numbers = [0.0; 3];
         for (number, symbol) in numbers.iter_mut().zip(["M", "k", "c"]) {
             let place = Values::place(symbol);
@@ -266,17 +266,17 @@ impl ExcitationSection {
         d: &Dimensionless,
         structure: Option<&Structure>,
     ) -> Result<f64, SceneError> {
-        let (excitation, unit) = structure.map_or((Excitation::Base, Unit::METRE), |structure| {
+        let (excitation, unit) = structure.map_or((Reference::Base, Unit::METRE), |structure| {
             (structure.excitation, structure.units().reference)
         });
         let key = match excitation {
-            Excitation::Base => "E (m)",
-            Excitation::Force => "F (N)",
+            Reference::Base => "E (m)",
+            Reference::Force => "F (N)",
         };
         let (row, amplitude) = match (self.g, self.e, self.f, excitation) {
             (Some(g), None, None, _) => (("excitation.G", g, "(dimensionless)"), d.amplitude(g)),
-            (None, Some(e), None, Excitation::Base) => (("excitation.E", e, "m"), unit.in_metres(e)),
-            (None, None, Some(f), Excitation::Force) => (("excitation.F", f, "N"), unit.in_metres(f)),
+            (None, Some(e), None, Reference::Base) => (("excitation.E", e, "m"), unit.in_metres(e)),
+            (None, None, Some(f), Reference::Force) => (("excitation.F", f, "N"), unit.in_metres(f)),
             (g, e, f, _) => {
                 let given = [("G", g), ("E", e), ("F", f)]
                     .into_iter()

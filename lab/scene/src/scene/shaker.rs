@@ -4,12 +4,12 @@ use std::f64::consts::TAU;
 
 use lovines::host::Row;
 use lovines::oscillator::Regime;
-use lovines::{Amplifier, Excitation as HostExcitation, Plant, Shaker, ShakerRows};
+use lovines::{Amplifier, Plant, Shaker, ShakerRows};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::structure::{HIGHEST, rows};
-use super::{Excitation, Structure};
+use super::{Reference, Structure};
 use crate::shaker_path::{BANDWIDTH, ShakerPath, speed};
 
 /// Points that a shaker adds to those of a structure.
@@ -105,17 +105,17 @@ impl SceneShaker {
 
     /// The reference in the sections of the host: the displacement of the table, or the force of the stinger; and the inertia that is subtracted from
     /// it, per negative acceleration.
-    pub(super) fn reference_and_inertia(&self, excitation: Excitation) -> [Row; 2] {
+    pub(super) fn reference_and_inertia(&self, excitation: Reference) -> [Row; 2] {
         let end = &self.rows.end;
         let inertia = end.iter().map(|pair| pair.map(|value| self.compensated_mass * value));
         match excitation {
-            Excitation::Base => [end.clone(), vec![[0.0; 2]; end.len()]],
-            Excitation::Force => [self.rows.force.clone(), inertia.collect()],
+            Reference::Base => [end.clone(), vec![[0.0; 2]; end.len()]],
+            Reference::Force => [self.rows.force.clone(), inertia.collect()],
         }
     }
 
     /// The reference of a motion with the frequency `omega`, rad/s, in the sections of the host.
-    pub fn reference(&self, excitation: Excitation, omega: f64) -> Row {
+    pub fn reference(&self, excitation: Reference, omega: f64) -> Row {
         let [reference, inertia] = self.reference_and_inertia(excitation);
         let both = reference.iter().zip(&inertia);
         both.map(|(row, inertia)| [0, 1].map(|n| row[n] + omega * omega * inertia[n]))
@@ -168,7 +168,7 @@ impl Structure {
         let Some(shaker) = &self.shaker else {
             return channels;
         };
-        if self.excitation == Excitation::Base {
+        if self.excitation == Reference::Base {
             channels.push(point((TABLE, &shaker.rows.end)));
         }
         let [voltage, current, force, armature] = shaker.limited().map(|(.., channel)| channel);
@@ -338,14 +338,14 @@ impl ShakerSection {
     /// The structure with the shaker attached.
     pub(super) fn attach(&self, structure: Structure) -> Result<Structure, String> {
         let end_mass = match (structure.excitation, self.cell_mass, self.table_mass) {
-            (Excitation::Base, None, Some(mass)) => mass,
-            (Excitation::Force, mass, None) => mass.unwrap_or(0.0),
-            (Excitation::Base, ..) => {
+            (Reference::Base, None, Some(mass)) => mass,
+            (Reference::Force, mass, None) => mass.unwrap_or(0.0),
+            (Reference::Base, ..) => {
                 return Err(
                     "a shaker moves the base of this structure: give `table_mass`, kg, and no `cell_mass`".into(),
                 );
             }
-            (Excitation::Force, _, Some(_)) => {
+            (Reference::Force, _, Some(_)) => {
                 return Err(
                     "`table_mass` belongs to a structure with excitation = \"base\"; a force cell has `cell_mass`, kg"
                         .into(),
@@ -427,7 +427,7 @@ impl Structure {
     ) -> Result<Self, String> {
         let text = |error: lovines::InvalidHost| error.to_string();
         let without = Box::new(self.clone());
-        let by = self.excitation.of_host();
+        let by = self.excitation.excitation();
         let equations = shaker.attach(&without.equations, by).map_err(text)?;
         // What a force cell does not compensate belongs to the structure.
         let in_front = self.drive.map(|drive| (drive, shaker.end_mass - compensated_mass));
@@ -437,7 +437,7 @@ impl Structure {
                 format!("compensated_mass = {compensated_mass} kg leaves {mass} kg in front of the force cell: {error}")
             })?;
         }
-        let host = equations.host(HostExcitation::Force).map_err(text)?;
+        let host = equations.host(lovines::Excitation::Force).map_err(text)?;
         let of_shaker = shaker.rows(&host, &without.equations, by).map_err(text)?;
         let beyond = vec![0.0; rows_beyond(self.excitation)];
         let coordinates = self.coordinates.iter().map(|point| [&point[..], &beyond].concat());
@@ -481,6 +481,6 @@ impl Structure {
 }
 
 /// Coordinates of a structure with a shaker beside its own: the table, and the stretch of the stinger.
-fn rows_beyond(excitation: Excitation) -> usize {
-    1 + usize::from(excitation == Excitation::Base)
+fn rows_beyond(excitation: Reference) -> usize {
+    1 + usize::from(excitation == Reference::Base)
 }

@@ -19,35 +19,6 @@ use super::{Reference, SceneError};
 use crate::units::{Unit, Units};
 use files::{Matrix, Residues};
 
-/// What drives a structure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Excitation {
-    /// The displacement of its base, m.
-    #[default]
-    Base,
-    /// A force at a point, N.
-    Force,
-}
-
-impl Excitation {
-    /// As plant and exact orbits name it.
-    pub(super) fn of_host(self) -> lovines::Excitation {
-        match self {
-            Self::Base => lovines::Excitation::Base,
-            Self::Force => lovines::Excitation::Force,
-        }
-    }
-
-    /// Unit of the drive, which is the reference of a structure with a shaker.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Base => "m",
-            Self::Force => "N",
-        }
-    }
-}
-
 /// A mode of a structure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StructureMode {
@@ -66,8 +37,8 @@ pub struct StructureMode {
 /// A structure: its equations, its points, what drives it and what is measured.
 #[derive(Debug, Clone, Serialize)]
 pub struct Structure {
-    /// What drives it.
-    pub excitation: Excitation,
+    /// What drives it, by itself or behind a shaker: the displacement of its base, or a force at a point.
+    pub excitation: Reference,
     /// Names of the points.
     pub points: Vec<String>,
     /// The point of the cavity, by its place among the points.
@@ -166,12 +137,12 @@ impl Structure {
     /// A structure with one mode at one point, which is driven by its base or by a force there.
     pub(super) fn of_oscillator(
         [mass, stiffness, damping]: [f64; 3],
-        excitation: Excitation,
+        excitation: Reference,
     ) -> Result<Self, SceneError> {
         let (omega, shape) = ((stiffness / mass).sqrt(), mass.sqrt().recip());
         let drive = match excitation {
-            Excitation::Base => mass.sqrt(),
-            Excitation::Force => shape,
+            Reference::Base => mass.sqrt(),
+            Reference::Force => shape,
         };
         let mode = StructureMode {
             omega,
@@ -180,7 +151,7 @@ impl Structure {
             out_of_phase: 0.0,
             drive,
         };
-        let place = (excitation == Excitation::Force).then_some(0);
+        let place = (excitation == Reference::Force).then_some(0);
         let at = Places { cavity: 0, drive: place, sensor: 0 };
         let parts = Parts {
             points: vec!["mass".to_owned()],
@@ -191,12 +162,12 @@ impl Structure {
     }
 
     /// The structure of these modes, or of the matrices where the damping couples them.
-    fn of_parts(excitation: Excitation, parts: Parts, at: Places, driven: usize) -> Result<Self, String> {
+    fn of_parts(excitation: Reference, parts: Parts, at: Places, driven: usize) -> Result<Self, String> {
         let Parts { points, modes, coupled } = parts;
         check(&points, &modes, driven, &at)?;
         let (equations, coordinates) = equations(&modes, coupled.as_ref(), &at, points.len());
         let host = equations
-            .host(excitation.of_host())
+            .host(excitation.excitation())
             .map_err(|error| error.to_string())?;
         let rows = rows(&host, &coordinates)?;
         let Places { cavity, drive, sensor } = at;
@@ -252,8 +223,8 @@ impl Structure {
     pub fn units(&self) -> Units {
         let mode = self.mode();
         let per_stiffness = match self.excitation {
-            Excitation::Base => 1.0,
-            Excitation::Force => mode.omega.powi(-2) / Reference::Force.per_base(2.0 * mode.zeta),
+            Reference::Base => 1.0,
+            Reference::Force => mode.omega.powi(-2) / Reference::Force.per_base(2.0 * mode.zeta),
         };
         let base = (self.at_cavity(mode) * mode.drive).abs() * per_stiffness;
         let reference = Unit::of(self.excitation.unit(), base);
@@ -279,8 +250,8 @@ impl Structure {
         let mode = self.mode();
         let (square, damping) = (mode.omega * mode.omega, 2.0 * mode.zeta * mode.omega);
         let drive = match self.excitation {
-            Excitation::Base => [square, damping],
-            Excitation::Force => [square * Reference::Force.per_base(2.0 * mode.zeta), 0.0],
+            Reference::Base => [square, damping],
+            Reference::Force => [square * Reference::Force.per_base(2.0 * mode.zeta), 0.0],
         };
         let alone = Section {
             oscillator: Oscillator::new(1.0, square, damping),
@@ -302,7 +273,7 @@ impl Structure {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct StructureSection {
-    excitation: Excitation,
+    excitation: Reference,
     cavity: Option<String>,
     drive: Option<String>,
     sensor: Option<String>,
@@ -490,9 +461,9 @@ impl StructureSection {
         };
         let cavity = required("cavity", &self.cavity)?;
         let drive = match (self.excitation, &self.drive) {
-            (Excitation::Force, name) => Some(required("drive", name)?),
-            (Excitation::Base, None) => None,
-            (Excitation::Base, Some(name)) => {
+            (Reference::Force, name) => Some(required("drive", name)?),
+            (Reference::Base, None) => None,
+            (Reference::Base, Some(name)) => {
                 return Err(format!(
                     "drive = \"{name}\" with excitation = \"base\": a base moves all supports; drop it, or take excitation = \"force\""
                 ));
@@ -569,13 +540,13 @@ impl StructureSection {
             let by_mass = mass.as_ref().map(|mass| self.by_mass(mass, number, &points, &shape));
             let by_mass = by_mass.transpose()?;
             let drive = match (self.excitation, participation) {
-                (Excitation::Force, None) => 0.0,
-                (Excitation::Force, Some(_)) => {
+                (Reference::Force, None) => 0.0,
+                (Reference::Force, Some(_)) => {
                     return Err(format!(
                         "mode {number} has a participation, which belongs to excitation = \"base\": a force acts by the shape at its point"
                     ));
                 }
-                (Excitation::Base, given) => given.or(by_mass).ok_or_else(|| {
+                (Reference::Base, given) => given.or(by_mass).ok_or_else(|| {
                     format!(
                         "mode {number} has no participation of the base: give `participation` in sqrt(kg), or `M`, from which it follows"
                     )
@@ -664,7 +635,7 @@ impl StructureSection {
     fn of_residues(&self, folder: &Path) -> Result<Parts, String> {
         self.only_with("M or M, C and K", "direction", self.direction.is_some())?;
         self.only_with("modes or C and K", "M", self.m.is_some())?;
-        if self.excitation == Excitation::Base {
+        if self.excitation == Reference::Base {
             return Err(
                 "residues of a receptance belong to excitation = \"force\": what a base does follows from modes with a participation, or from M, \
                  C and K"
