@@ -20,7 +20,7 @@ use super::output::{Results, Written, output, results, written};
 use super::recording::Recording;
 use super::signals::Orderly;
 use super::watch::{Watch, WatchArguments};
-use super::{check, failure::Failure, pack::fmus, summary};
+use super::{check, failure::Failure, pack::fmus};
 
 /// Share of late samples of a rig in real time above which its results are doubtful. A late sample holds the drive for one more sample: at
 /// this share, the default scene has one in every period.
@@ -226,7 +226,7 @@ impl Session {
         match result {
             Ok(result) => Ok((result, ended)),
             Err(error) => {
-                let runs_away = || advice::runs_away(&samples, plan).then_some(advice::Reason::WrongSign);
+                let runs_away = || advice::runs_away(&samples, plan);
                 let reason = match error {
                     // The orbits are those at the requested phase and drive.
                     ExperimentError::OtherThanAsked { .. } => runs_away(),
@@ -234,7 +234,7 @@ impl Session {
                         advice::reason(scene, &plan.knowledge.numbers, advice::last_regime(&samples, plan))
                     }),
                     ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. } => {
-                        runs_away().or_else(|| advice::cut_off(scene, &plan.knowledge.numbers))
+                        Some(runs_away().unwrap_or_else(|| advice::cut_off(scene, &plan.knowledge.numbers)))
                     }
                     // An irregular motion may resemble a failed sensor: was there another one to lock on?
                     ExperimentError::Tripped {
@@ -242,12 +242,9 @@ impl Session {
                         fault: Fault::Implausible | Fault::LockLost,
                         ..
                     } => advice::reason(scene, &plan.knowledge.numbers, None),
-                    ExperimentError::Tripped { fault: Fault::NoSignal, .. } => {
-                        advice::is_hit_at_once(scene, &samples).then_some(advice::Reason::HitAtOnce)
-                    }
+                    ExperimentError::Tripped { fault: Fault::NoSignal, .. } => advice::hit_at_once(scene, &samples),
                     _ => None,
                 };
-                let reason = reason.map(|reason| summary::not_locked(&reason, scene));
                 let failure = Failure::from(error);
                 if let Some(watch) = &mut self.watch {
                     watch.failure = Some(failure.message.clone());

@@ -70,7 +70,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
                 }
                 _ => None,
             };
-            let reason = reason.map(|reason| summary::not_locked(&reason, &scene));
             ended.keep(&record.samples, &plan);
             return Err(ended.without_result(Failure::from(error), reason));
         }

@@ -1,6 +1,5 @@
 //! Results in words and tables.
 
-use vines::advice::Reason;
 use vines::backbone::LevelPoint;
 use vines::cells;
 use vines::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
@@ -50,71 +49,6 @@ fn values(at: &ResonancePoint) -> [String; 3] {
         value(at.a_m, at.u_a_m),
         value(drive.value, drive.uncertainty),
     ]
-}
-
-/// Why a run of the scene did not lock the symmetric 1:1 motion, and what to do.
-pub(super) fn not_locked(reason: &Reason, scene: &Scene) -> String {
-    let places = |stable: &[Orbit]| {
-        let place = |orbit: &Orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
-        let places: Vec<String> = stable.iter().map(place).collect();
-        format!(
-            "at this G, the stable symmetric 1:1 motion is at {}",
-            places.join(" and at ")
-        )
-    };
-    let text = match reason {
-        Reason::WrongSign => {
-            return "the loop runs away from resonance: its frequency rises while the response lags, or falls while it leads. The sign of the \
-                    controller's gain, or of its phase, is wrong"
-                .into();
-        }
-        Reason::HitAtOnce => {
-            return "the particle moves at the start and hits before the controller knows the signal, in which an impact is a step or a peak; set \
-                    start.dq2 = 0: the search brings impacts about"
-                .into();
-        }
-        Reason::Unstable { g, range } => {
-            let range = range.map_or_else(
-                || "at no G".into(),
-                |[low, high]| {
-                    let gaps = if (low..=high).contains(g) { ", with gaps" } else { "" };
-                    format!("for G from {low:.3} to {high:.3}{gaps}")
-                },
-            );
-            format!("there is no stable symmetric 1:1 orbit at G = {g:.4}; it is stable {range}")
-        }
-        Reason::Excluded { stable } => format!(
-            "{}, thus at omega = {:.4} omega0, which controller.omega_min = {} and controller.omega_max = {} exclude",
-            places(stable),
-            stable[0].omega,
-            scene.controller.omega_min,
-            scene.controller.omega_max
-        ),
-        Reason::LagsLess { stable } => format!(
-            "{}, where under a constant drive the response lags less at a higher frequency: no phase loop holds it. Try another G",
-            places(stable)
-        ),
-        Reason::NoImpacts { stable, onset } => format!(
-            "the particle does not reach the walls: under a constant drive, impacts begin at G = {onset:.3}; give it a velocity in [start]; {}",
-            places(stable)
-        ),
-        Reason::Coexists { stable, regime: Regime::Symmetric } => places(stable),
-        Reason::CutOff { stable } => format!("the limit cut the motion off before it settled; {}", places(stable)),
-        Reason::Coexists { stable, regime } => format!(
-            "the motion is {}, and coexists with the wanted one: {}. Try another G or another [start]",
-            regime.name(),
-            places(stable)
-        ),
-    };
-    // The exact orbits are those of all modes of a structure; only the onset of impacts is of one oscillator.
-    let left_out = match reason {
-        Reason::NoImpacts { .. } => scene.left_out(),
-        _ => scene.left_out_of_cavity(),
-    };
-    match left_out {
-        Some(left_out) => format!("{text}. This holds for the ideal cavity, without {left_out}"),
-        None => text,
-    }
 }
 
 /// A value with its unit, which may be empty.
