@@ -384,7 +384,7 @@ pub struct TrackedPoint {
 
 impl TrackedPoint {
     /// The regime, by the impacts where the rig reports them.
-    fn regime(&self) -> Regime {
+    pub fn regime(&self) -> Regime {
         self.point.regime_by_impacts.unwrap_or(self.point.regime)
     }
 
@@ -432,20 +432,6 @@ impl TrackedComparison {
         self.points.iter().any(|row| row.point.regime_by_impacts.is_some())
     }
 
-    /// Why these points are no backbone of a nonlinear motion, if they are none.
-    pub fn doubt(&self) -> Option<Doubt> {
-        let count = |wanted: Regime| self.points.iter().filter(|row| row.regime() == wanted).count();
-        let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
-        let of = self.points.len();
-        if linear == of {
-            Some(Doubt::Linear)
-        } else if linear + doubtful == of {
-            Some(Doubt::NotEstablished { points: doubtful })
-        } else {
-            (!self.points.iter().any(TrackedPoint::is_of_backbone)).then_some(Doubt::NotSettled)
-        }
-    }
-
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
     pub fn worst(&self) -> Option<LargestErrors> {
         let errors = self.points.iter().filter(|row| row.point.settled).filter_map(|row| {
@@ -458,20 +444,6 @@ impl TrackedComparison {
             nearest: largest.nearest.max(errors.nearest),
         })
     }
-}
-
-/// Why tracked points are no backbone of a nonlinear motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Doubt {
-    /// All points are of the linear mode, or near the linear response of a rig that does not report impacts.
-    Linear,
-    /// Of some points this is not established, and all others are linear.
-    NotEstablished {
-        /// Number of these points.
-        points: usize,
-    },
-    /// No point is a settled one of a motion with impacts or, where none are reported, of a nonlinear one.
-    NotSettled,
 }
 
 /// Largest errors of the points of a tracked backbone.

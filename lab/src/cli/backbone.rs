@@ -1,7 +1,8 @@
 //! `vines backbone`: the backbone, tracked with the loop closed.
 
 use clap::Args;
-use vines::comparison::{Doubt, TrackedComparison};
+use vines::comparison::TrackedComparison;
+use vines::identification::Regime;
 use vines::survey::{contradiction, stable_backbone};
 use vines::{backbone::track, numerics::range, report, scene::Scene};
 
@@ -86,33 +87,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
             failure.message += &format!("\n{of} points were measured before");
             Some(failure)
         }
-        None => result
-            .doubt()
-            .map(|doubt| Failure::run(doubt_in_words(doubt, &result, &scene))),
+        None => (settled == 0).then(|| Failure::run(not_a_backbone(&result, &scene))),
     };
     experiment.finish(ended, &result, &text, files, failure)
 }
 
-/// Why the points are no backbone, and what to do.
-fn doubt_in_words(doubt: Doubt, result: &TrackedComparison, scene: &Scene) -> String {
+/// Why the points, none of which is a settled one of a motion with impacts or, where none are reported, of a nonlinear one, are no backbone; and what to
+/// do.
+fn not_a_backbone(result: &TrackedComparison, scene: &Scene) -> String {
+    let count = |wanted: Regime| result.points.iter().filter(|row| row.regime() == wanted).count();
+    let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
     let of = result.points.len();
-    match doubt {
-        Doubt::Linear if !result.reports_impacts() => format!(
+    let (is_linear, is_doubtful) = (linear == of, linear + doubtful == of);
+    match result.reports_impacts() {
+        false if is_linear => format!(
             "all {of} points are near the linear response: within these levels there is no nonlinear motion. Set backbone.C_from to a larger one"
         ),
-        Doubt::NotEstablished { points } if !result.reports_impacts() => format!(
-            "whether the motion is linear is not established of {points} of {of} points: their distance from the linear response, which the loop \
+        false if is_doubtful => format!(
+            "whether the motion is linear is not established of {doubtful} of {of} points: their distance from the linear response, which the loop \
              check measures, is within its uncertainty. Do not skip the loop check; set backbone.C_from to a larger level; reduce noise"
         ),
-        Doubt::NotSettled if !result.reports_impacts() => {
-            format!("none of {of} points is a settled point of a nonlinear motion: the column `motion` says why")
-        }
-        Doubt::Linear => format!(
+        false => format!("none of {of} points is a settled point of a nonlinear motion: the column `motion` says why"),
+        true if is_linear => format!(
             "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give it \
              a velocity in [start]"
         ),
-        Doubt::NotEstablished { points } => format!("the regime of {points} of {of} points is not established"),
-        Doubt::NotSettled => {
+        true if is_doubtful => format!("the regime of {doubtful} of {of} points is not established"),
+        true => {
             let levels = stable_backbone(scene, &scene.dimensionless());
             let (low, high) = range((f64::INFINITY, 0.0), levels.iter().map(|orbit| orbit.c));
             let settled = format!("none of {of} points is a settled point of a symmetric 1:1 motion");
