@@ -11,8 +11,8 @@ use serde::Serialize;
 use thiserror::Error;
 use vines_identify::{ChannelTest, Data, EXCLUDED, Fit, Hypotheses, probability};
 pub use vines_identify::{FitError, Hypothesis, Known, MeasuredPoint, Quantity};
-use vines_model::Definition;
 use vines_model::numerics::{Estimate, SIGNIFICANT};
+use vines_model::{ArgumentError, Definition};
 use vines_scene::linear::{MeasuredLinear, ParticleState};
 pub use vines_scene::scene::table::{Channel, Contents, plain_table};
 use vines_scene::scene::{Parameters, Scene, Units};
@@ -20,7 +20,7 @@ use vines_scene::scene::{Parameters, Scene, Units};
 use crate::identification::ResonancePoint;
 
 pub use channels::Selection;
-pub use recording::{Recording, RecordingError, Stretch, decay_in_words};
+pub use recording::{Recording, Stretch, decay_in_words};
 
 /// Standard uncertainty of the gain of a reference that was calibrated as usual, relative.
 pub const CALIBRATION: f64 = 0.01;
@@ -55,12 +55,12 @@ pub fn decimals(uncertainty: f64) -> usize {
 ///
 /// # Errors
 /// A scene that does not say it.
-pub fn requires_sensor(origin: &str, scene: &Scene) -> Result<(), RecordingError> {
+pub fn requires_sensor(origin: &str, scene: &Scene) -> Result<(), ArgumentError> {
     let unstated = || {
-        RecordingError::new(format!(
+        format!(
             "{origin}: what does the sensor of the response read? It is not from `vines`, and the scene does not say it: set resonance.sensor = \"q1\" \
              for a sensor on the structure (in the file of --scene, or --set resonance.sensor=q1), or \"v\" for q1 + m/M q2"
-        ))
+        ).into()
     };
     scene.states_sensor.then_some(()).ok_or_else(unstated)
 }
@@ -98,7 +98,7 @@ impl Default for Measurements {
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum NotFound {
     Fit(#[from] FitError),
-    Recording(#[from] RecordingError),
+    Recording(#[from] ArgumentError),
 }
 
 /// The rig that fits what was measured.
@@ -137,12 +137,12 @@ pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize))
 }
 
 /// Refuses points whose drive is no drive at phase resonance: there the response is larger than the base, and the base feeds at least what the damper takes.
-fn plausible(points: &[MeasuredPoint], scene: &Scene) -> Result<(), RecordingError> {
+fn plausible(points: &[MeasuredPoint], scene: &Scene) -> Result<(), ArgumentError> {
     let (Units { response, reference, .. }, stated) = (scene.units(), scene.knowledge().linear.bandwidth());
     for (n, MeasuredPoint { response: a, drive: e, .. }) in points.iter().enumerate() {
         let allowed = 2.0 * recording::LEAST_DAMPING * a.value..a.value;
         if e.value > 0.0 && a.value > 0.0 && !allowed.contains(&e.value) {
-            return Err(RecordingError::new(format!(
+            return Err(format!(
                 "point {}: at phase resonance a response of {:.4e} needs a drive between {:.4e} and {:.4e} (without impacts, with the damping of the \
                  scene, {:.4e}), and this one is {:.4e}: give the units of both, for instance --column A=NAME:mm --column E=NAME:um",
                 n + 1,
@@ -151,7 +151,7 @@ fn plausible(points: &[MeasuredPoint], scene: &Scene) -> Result<(), RecordingErr
                 reference.quantity(allowed.end),
                 reference.quantity(stated * a.value),
                 reference.quantity(e.value)
-            )));
+            ).into());
         }
     }
     Ok(())

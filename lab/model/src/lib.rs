@@ -42,7 +42,7 @@ pub mod theory;
 pub use definition::{Definition, Measurand, Reference, Sensor};
 pub use dimensionless::Dimensionless;
 
-/// An argument or a setting that cannot be read; the message says what is expected.
+/// An argument, a setting or a file that cannot be used; the message says what is wrong, and what is expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ArgumentError(String);

@@ -9,7 +9,7 @@ use std::str::FromStr;
 use serde::Deserialize;
 use serde_json::Value;
 use vines::ArgumentError;
-use vines::fit::{Contents, MeasuredPoint, Recording, RecordingError, Selection, plain_table, requires_sensor};
+use vines::fit::{Contents, MeasuredPoint, Recording, Selection, plain_table, requires_sensor};
 use vines::identification::Regime;
 use vines::linear::MeasuredLinear;
 use vines::numerics::Estimate;
@@ -163,7 +163,6 @@ pub(super) fn measurement(
     reading: Reading<'_>,
     selection: &Selection,
 ) -> Result<Measurement, ArgumentError> {
-    let refused = |error: RecordingError| ArgumentError::from(error.to_string());
     let contents = match source {
         Source::Channels(contents) => contents,
         Source::Json(bytes) => return of_json(path, &bytes, reading),
@@ -177,7 +176,7 @@ pub(super) fn measurement(
     let has_points = !reading.columns.is_empty() || COLUMNS.iter().any(|(_, name, _)| has(&[name]));
     if has_points && !is_named {
         if !own_points {
-            requires_sensor(&contents.origin, reading.scene).map_err(refused)?;
+            requires_sensor(&contents.origin, reading.scene)?;
         }
         let row = |row: Vec<(&str, String)>| row.into_iter().map(|(name, cell)| (name.to_string(), cell)).collect();
         let rows: Vec<Row> = contents.rows().map(row).collect();
@@ -187,16 +186,15 @@ pub(super) fn measurement(
     }
     if !is_named && contents.unit("response").is_none() {
         let names = COLUMNS.map(|(_, name, _)| name).join(", ");
-        return Err(refused(RecordingError::new(contents.refusal(&format!(
+        return Err(contents.refusal(&format!(
             " has neither the channels of a recording nor columns of points ({names}). Name the channels with --response NAME:UNIT and --drive \
              NAME:UNIT, or the columns of points with --column"
-        )))));
+        ))
+        .into());
     }
     let of_itself = Selection { response: None, drive: None, ..selection.clone() };
     let selection = if is_beside && !is_named { &of_itself } else { selection };
-    Ok(Measurement::Recording(
-        Recording::of(&contents, selection).map_err(refused)?,
-    ))
+    Ok(Measurement::Recording(Recording::of(&contents, selection)?))
 }
 
 /// Points in what `vines identify`, `backbone` and `check` write as JSON.

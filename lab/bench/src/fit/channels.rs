@@ -2,10 +2,10 @@
 
 use std::ops::Deref;
 
-use vines_model::Measurand;
 use vines_model::numerics::{golden_section, mean, mean_square, range, slope};
+use vines_model::{ArgumentError, Measurand};
 
-use super::recording::{Recording, RecordingError};
+use super::recording::Recording;
 use vines_rig::unit;
 use vines_scene::scene::table::{Channel, Contents};
 
@@ -62,7 +62,7 @@ impl Recording {
     /// # Errors
     /// A channel that is missing, named twice or not in a unit of a motion; a time that is interrupted or says nothing. The message has the channels
     /// as they were read.
-    pub fn of(contents: &Contents, selection: &Selection) -> Result<Self, RecordingError> {
+    pub fn of(contents: &Contents, selection: &Selection) -> Result<Self, ArgumentError> {
         File(contents).recording(selection)
     }
 }
@@ -80,7 +80,7 @@ impl Deref for File<'_> {
 
 impl File<'_> {
     /// Refuses a rate that is not above 0, and a delay that is not finite.
-    fn checked(&self, selection: &Selection) -> Result<(), RecordingError> {
+    fn checked(&self, selection: &Selection) -> Result<(), ArgumentError> {
         if let Some(rate) = selection.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             return Err(self.refused(&format!(": the rate is {rate} samples a second; it must be above 0")));
         }
@@ -92,7 +92,7 @@ impl File<'_> {
         Ok(())
     }
 
-    fn recording(&self, selection: &Selection) -> Result<Recording, RecordingError> {
+    fn recording(&self, selection: &Selection) -> Result<Recording, ArgumentError> {
         self.checked(selection)?;
         let response = selection.response.as_deref().unwrap_or("response");
         let (mut notes, mut units) = (Vec::new(), Vec::new());
@@ -174,7 +174,7 @@ impl File<'_> {
         selection: &Selection,
         response: &Channel,
         notes: &mut Vec<String>,
-    ) -> Result<Channel, RecordingError> {
+    ) -> Result<Channel, ArgumentError> {
         let mut allowed = Measurand::ALL.map(Measurand::unit).to_vec();
         if self.is_of_vines() {
             allowed.push("N");
@@ -191,12 +191,12 @@ impl File<'_> {
         }
     }
 
-    fn refused(&self, message: &str) -> RecordingError {
-        RecordingError::new(self.refusal(message))
+    fn refused(&self, message: &str) -> ArgumentError {
+        self.refusal(message).into()
     }
 
     /// A channel by its name, the last part of its path, or its number.
-    fn find(&self, name: &str) -> Result<Option<&Channel>, RecordingError> {
+    fn find(&self, name: &str) -> Result<Option<&Channel>, ArgumentError> {
         let name = name.trim().trim_start_matches('/');
         let has_one = self.channels.iter().any(|channel| channel.name == name);
         let is_it = |channel: &Channel| name == if has_one { &channel.name } else { last(channel) };
@@ -214,7 +214,7 @@ impl File<'_> {
     }
 
     /// A channel and its unit, from the text of an option.
-    fn named(&self, text: &str, option: &str) -> Result<(&Channel, Option<String>), RecordingError> {
+    fn named(&self, text: &str, option: &str) -> Result<(&Channel, Option<String>), ArgumentError> {
         // Names may have a colon.
         if let Some(channel) = self.find(text)? {
             return Ok((channel, None));
@@ -228,10 +228,7 @@ impl File<'_> {
             .iter()
             .find(|[known, _]| [text, name].contains(&known.as_str()))
         {
-            return Err(RecordingError::new(format!(
-                "{}, channel {refused}: {reason}",
-                self.origin
-            )));
+            return Err(format!("{}, channel {refused}: {reason}", self.origin).into());
         }
         let names: Vec<&str> = self.channels.iter().map(|one| one.name.as_str()).collect();
         let channel = self.find(name)?.ok_or_else(|| {
@@ -250,7 +247,7 @@ impl File<'_> {
         option: &str,
         allowed: &[&str],
         notes: &mut Vec<String>,
-    ) -> Result<Channel, RecordingError> {
+    ) -> Result<Channel, ArgumentError> {
         let (channel, given) = self.named(text, option)?;
         let Channel { name, unit: stated, values, texts, clock } = channel;
         let is_text = |(cell, value): &(&String, &f64)| value.is_nan() && !cell.is_empty() && !is_nan(cell);
@@ -319,7 +316,7 @@ impl File<'_> {
     }
 
     /// The base that a run of `vines` without a base sensor commanded: from its columns omega and E.
-    fn commanded(&self, selection: &Selection) -> Result<Option<Channel>, RecordingError> {
+    fn commanded(&self, selection: &Selection) -> Result<Option<Channel>, ArgumentError> {
         let is_silent = |channel: &Channel| channel.values.iter().all(|value| value.is_nan());
         if self.find("reference")?.is_some_and(|channel| !is_silent(channel)) {
             return Ok(None);
@@ -355,7 +352,7 @@ impl File<'_> {
     }
 
     /// The channel of the time, s.
-    fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Channel>, RecordingError> {
+    fn time(&self, selection: &Selection, notes: &mut Vec<String>) -> Result<Option<Channel>, ArgumentError> {
         // A `T [°C]` is no time.
         let named = |channel: &&Channel| is_named_time(channel) && (channel.unit.is_empty() || is_time(channel));
         let all = |is_it: &dyn Fn(&&Channel) -> bool| self.channels.iter().filter(|one| is_it(one)).collect::<Vec<_>>();
@@ -405,7 +402,7 @@ impl File<'_> {
         rate: Option<f64>,
         both: [&mut Channel; 2],
         notes: &mut Vec<String>,
-    ) -> Result<[f64; 2], RecordingError> {
+    ) -> Result<[f64; 2], ArgumentError> {
         let (times, name, origin) = (&time.values, &time.name, &self.origin);
         let refused = |message: String| Err(self.refused(&format!(", channel {name}: {message}")));
         let count = times.len();
@@ -480,15 +477,15 @@ impl File<'_> {
     }
 
     /// Refuses times that go on from the sample `n` by much more or less than a step, s.
-    fn interrupted(&self, times: &[f64], n: usize, step: f64) -> RecordingError {
-        RecordingError::new(format!(
+    fn interrupted(&self, times: &[f64], n: usize, step: f64) -> ArgumentError {
+        format!(
             "{}, {}: the time goes from {} s to {} s, where a step is {step:.6e} s: the recording is interrupted there. Fit the parts as files of their \
              own, `vines fit one.csv two.csv`",
             self.origin,
             self.place(n + 1),
             times[n],
             times[n + 1]
-        ))
+        ).into()
     }
 
     /// Start and step of the clock where several samples have the same time, because its resolution is coarse: only a rate tells the step. `None`
@@ -498,7 +495,7 @@ impl File<'_> {
         time: &Channel,
         rate: Option<f64>,
         notes: &mut Vec<String>,
-    ) -> Result<Option<[f64; 2]>, RecordingError> {
+    ) -> Result<Option<[f64; 2]>, ArgumentError> {
         let (times, name) = (&time.values, &time.name);
         let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let count = steps.len();

@@ -9,11 +9,10 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
-use thiserror::Error;
 use vines_estimate::Oscillations;
 use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Source, Unidentified, identify};
 use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
-use vines_model::{Measurand, Sensor};
+use vines_model::{ArgumentError, Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
 use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, ParticleState};
 use vines_scene::scene::{Scene, Units};
@@ -55,22 +54,8 @@ pub fn decay_in_words(decay: &MeasuredLinear) -> String {
     format!("no impacts: this is a linear decay, f0 = {f0} Hz, zeta = {zeta}")
 }
 
-/// Why a recording gives no points: the message says what is wrong, and what to do.
-#[derive(Debug, Error)]
-#[error("{0}")]
-pub struct RecordingError(String);
-
-impl RecordingError {
-    /// With this message.
-    pub fn new(message: String) -> Self {
-        Self(message)
-    }
-}
-
-/// Periods within which a constant hardly drifts.
+/// Periods within which a constant hardly drifts, and fewest of a recording: the drift is removed over as many.
 const SLOW: usize = 16;
-/// Fewest periods of a recording: the drift is removed over as many.
-const FEWEST_PERIODS: f64 = SLOW as f64;
 /// Fewest samples in a period: the fit of one has nine unknowns, and the third harmonic must be resolved.
 const COARSEST: f64 = 12.0;
 /// Fewest periods of a decay, and periods of the pieces whose damping is compared.
@@ -96,7 +81,7 @@ impl Recording {
     ///
     /// # Errors
     /// Channels that are no measurement of a rig near resonance; the message says which, and what to do.
-    pub fn prepared(&self, knowledge: &Knowledge) -> Result<Self, RecordingError> {
+    pub fn prepared(&self, knowledge: &Knowledge) -> Result<Self, ArgumentError> {
         let knowledge = self.knowledge(knowledge);
         let linear = knowledge.linear;
         self.check(&linear)?;
@@ -104,21 +89,21 @@ impl Recording {
         let of_response = self.measurands[0];
         if of_response != Measurand::Displacement && knowledge.numbers.definition.sensor == Sensor::V {
             let (Self { origin, channels: [response, _], .. }, name) = (self, of_response.name());
-            return Err(RecordingError(format!(
+            return Err(format!(
                 "{origin}: the response {response} measures {name}, and the scene's sensor reads v, which contains the particle: no sensor on the structure \
                  does; set resonance.sensor = \"q1\" in the scene, or with --set"
-            )));
+            ).into());
         }
         let by_force = knowledge.target.units.reference.symbol == "N";
         if self.of_force != by_force && self.drive_is_named() {
             let what = |is_force| if is_force { "a force, N" } else { "the motion of a base" };
-            return Err(RecordingError(format!(
+            return Err(format!(
                 "{}: the drive {} is {}, and the structure of the scene is driven by {}; give the scene that was recorded",
                 self.origin,
                 self.channels[1],
                 what(self.of_force),
                 what(by_force)
-            )));
+            ).into());
         }
         for (channel, values) in [&mut one.response, &mut one.drive].into_iter().enumerate() {
             values
@@ -134,7 +119,7 @@ impl Recording {
     ///
     /// # Errors
     /// As [`Recording::prepared`], and where the base rests and the response does not decay.
-    pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<MeasuredLinear>, RecordingError> {
+    pub fn linear_decay(&self, knowledge: &Knowledge) -> Result<Option<MeasuredLinear>, ArgumentError> {
         let knowledge = self.knowledge(knowledge);
         let one = self.prepared(&knowledge)?;
         let [response, base] = [0, 1].map(|channel| one.fundamentals(channel, &knowledge));
@@ -168,10 +153,10 @@ impl Recording {
             } else {
                 "no channel of the base is named".into()
             };
-            return Err(RecordingError(format!(
+            return Err(format!(
                 "{origin}: {base}, and the response {response} does not decay for {FEWEST_OF_DECAY} periods. Name the channel of the base with --drive NAME:UNIT; if it is named, is \
                  it connected?"
-            )));
+            ).into());
         };
         let pieces: Vec<_> = values.chunks_exact(FEWEST_OF_DECAY * period).map(fitted).collect();
         let significant = (SIGNIFICANT.powi(2) + 2.0 * (pieces.len() as f64).ln()).sqrt();
@@ -206,9 +191,9 @@ impl Recording {
     }
 
     /// Refuses what is no measurement.
-    fn check(&self, linear: &LinearResponse) -> Result<(), RecordingError> {
+    fn check(&self, linear: &LinearResponse) -> Result<(), ArgumentError> {
         let Self { origin, channels, sample_time, .. } = self;
-        let refused = |message: String| Err(RecordingError(format!("{origin}{message}")));
+        let refused = |message: String| Err(format!("{origin}{message}").into());
         let hertz = linear.omega0 / TAU;
         let both = [&self.response, &self.drive];
         let [count, drives] = both.map(Vec::len);
@@ -234,9 +219,9 @@ impl Recording {
             ));
         }
         let (seconds, periods) = (count as f64 * sample_time, count as f64 * sample_time * hertz);
-        if periods < FEWEST_PERIODS {
+        if periods < SLOW as f64 {
             return refused(format!(
-                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {FEWEST_PERIODS} are needed"
+                ": {seconds:.3} s are {periods:.1} periods of the scene's natural frequency {hertz:.4} Hz; at least {SLOW} are needed"
             ));
         }
         for ((values, channel), measurand) in both.into_iter().zip(channels).zip(self.measurands) {
@@ -298,7 +283,7 @@ impl Recording {
     ///
     /// # Errors
     /// Channels that cannot be those of a rig near resonance, and a recording without symmetric 1:1 motion; the message says what to do.
-    pub fn curve(&self, scene: &Scene) -> Result<(MeasuredCurve, Vec<Stretch>), RecordingError> {
+    pub fn curve(&self, scene: &Scene) -> Result<(MeasuredCurve, Vec<Stretch>), ArgumentError> {
         let knowledge = self.knowledge(&scene.knowledge());
         let one = self.prepared(&knowledge)?;
         one.plausible(&knowledge)?;
@@ -351,7 +336,7 @@ impl Recording {
 
     /// Refuses channels of which the response has no oscillation near the natural frequency, and channels that are swapped, or of which one has the
     /// wrong sign.
-    fn plausible(&self, knowledge: &Knowledge) -> Result<(), RecordingError> {
+    fn plausible(&self, knowledge: &Knowledge) -> Result<(), ArgumentError> {
         let Self { origin, channels: [response, drive], .. } = self;
         let middle = mean(self.response.iter().copied());
         let centred: Vec<f64> = self.response.iter().map(|value| value - middle).collect();
@@ -367,41 +352,41 @@ impl Recording {
         let is_near = 2 * of_response.iter().filter(|one| one.is_seen()).count() >= of_response.len()
             && turned.arg().abs() < NEAR_RESONANCE * TAU;
         if !is_near && (strongest / hertz - 1.0).abs() > NEAR_RESONANCE {
-            return Err(RecordingError(format!(
+            return Err(format!(
                 "{origin}, channel {response}: the strongest oscillation has {strongest:.4} Hz, and the scene's natural frequency is {hertz:.4} Hz. \
                  If the rate of {rate:.6} samples a second is wrong, give it with --rate; if the scene is wrong, give stiffness and mass with --scene"
-            )));
+            ).into());
         }
         let ratio = (power(&of_base) / power(&of_response)).sqrt();
         if ratio > 1.0 {
-            return Err(RecordingError(format!(
+            return Err(format!(
                 "{origin}: channel {drive} (base) is {ratio:.1} times as large as channel {response} (response), and at resonance the response is the \
                  larger one: are the channels swapped, or their units different?"
-            )));
+            ).into());
         }
         // The base feeds a passive rig, which lags.
         let fed: Complex64 = pairs().map(|(response, base)| response.value * base.value.conj()).sum();
         if fed.im > fed.re.abs() {
-            return Err(RecordingError(format!(
+            return Err(format!(
                 "{origin}: the response (channel `{response}`) leads the base (channel `{drive}`) by about a quarter of a period, where it lags on \
                  every passive rig: one of the channels has the wrong sign; give it a unit with a minus, for instance --drive {drive}:-1mm"
-            )));
+            ).into());
         }
         Ok(())
     }
 
     /// Why there is no curve.
-    fn without_curve(&self, why: &Unidentified) -> RecordingError {
+    fn without_curve(&self, why: &Unidentified) -> ArgumentError {
         let Self { origin, .. } = self;
         let found: Vec<&str> = why.motions.iter().map(|motion| MOTIONS[*motion]).collect();
         let found = match &found[..] {
             [] => "nothing".into(),
             some => some.join(", "),
         };
-        RecordingError(format!(
+        format!(
             "{origin}: fewer than thirty periods show symmetric 1:1 impacts of the particle that the scene describes (found: {found}). Record held \
              levels, a slow sweep or a decay above the fold, and give the scene that was recorded: f0 within 1 %, b within 10 %, masses within 15 %"
-        ))
+        ).into()
     }
 }
 
