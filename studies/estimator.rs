@@ -91,7 +91,7 @@ struct Judged {
 }
 
 fn judged(rig: &Rig, recorded: &Recorded) -> Option<Judged> {
-    let signals = Signals::of_displacements([&recorded.response, &recorded.base], recorded.sample_time);
+    let signals = Signals::of_displacements([recorded.response.clone(), recorded.base.clone()], recorded.sample_time);
     let samples = Samples { signals, sensor: Sensor::Q1 };
     let found = identify(&samples, &rig.scene).ok()?;
     let (curve, [u_drive, u_sigma]) = of_curve(&rig.truth, &found)?;

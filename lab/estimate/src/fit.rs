@@ -58,8 +58,6 @@ pub struct Solution {
     normal: Cholesky<f64, Dyn>,
     /// The matrix and the right-hand side without priors, and how the latter changes with the gain of the base.
     information: (DMatrix<f64>, DMatrix<f64>),
-    /// Innovations that the unknowns leave, with variance 1.
-    pub innovations: Vec<f64>,
 }
 
 impl<'a> Estimate<'a> {
@@ -163,14 +161,11 @@ impl<'a> Estimate<'a> {
         let without = filter.logarithms + products[(0, 0)];
         let deviance =
             without + constant - known.dot(&unknowns) + normal.ln_determinant() + 4.0 * (m - 2) as f64 * hyper[1].ln();
-        let innovations = white.row(0).transpose() - white.rows(2, n).tr_mul(&unknowns);
-        let innovations = innovations.as_slice().to_vec();
         deviance.is_finite().then_some(Solution {
             deviance,
             unknowns,
             normal,
             information: (information, right),
-            innovations,
         })
     }
 

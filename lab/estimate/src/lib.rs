@@ -10,7 +10,7 @@
 //! where `A exp(i psi)` is the fundamental of the response. The force S of steady motion is a cubic spline over the amplitude, with the prior of an
 //! integrated random walk. A Kalman filter over periods whitens the record, generalised least squares gives S, and the curves follow from it. There
 //! are no windows: held levels, sweeps and mixtures are one case. What is particular to the element that makes the force is behind the trait
-//! [`Element`]; without it the force follows at once.
+//! [`Element`].
 
 #![forbid(unsafe_code)]
 
@@ -34,5 +34,5 @@ pub use level::{Disturbance, Level, Motion};
 pub use linear::Linear;
 pub use oscillations::Oscillations;
 pub use periods::Periods;
-pub use record::{Element, Immediate, Path, Record, Signals};
+pub use record::{Element, Path, Record, Signals};
 pub use windows::{Window, probabilities, windows};

@@ -21,28 +21,6 @@ pub trait Element {
     fn along(&self, path: &Path) -> Option<Vec<Vec<(f64, Complex64)>>>;
 }
 
-/// An element whose force follows at once, and of which nothing else is known.
-#[derive(Debug, Clone, Copy)]
-pub struct Immediate;
-
-impl Element for Immediate {
-    fn steady(&self, _: f64) -> Complex64 {
-        Complex64::ZERO
-    }
-
-    fn lag(&self, _: f64) -> Complex64 {
-        Complex64::ZERO
-    }
-
-    fn is_smooth(&self, _: f64) -> bool {
-        true
-    }
-
-    fn along(&self, _: &Path) -> Option<Vec<Vec<(f64, Complex64)>>> {
-        None
-    }
-}
-
 /// The response as a path: the logarithm of its complex amplitude over the time.
 pub struct Path {
     spline: CubicSpline,
@@ -80,23 +58,21 @@ impl Path {
     }
 }
 
-/// Equally spaced samples of a record.
-#[derive(Debug, Clone, Copy)]
-pub struct Signals<'a> {
-    /// Displacement of the response, m.
-    pub response: &'a [f64],
-    /// Displacement of the base, m.
-    pub base: &'a [f64],
-    /// What the sensors of response and base read, over a power of omega0, whose noise is white: the displacements, or their derivatives.
-    pub readings: [&'a [f64]; 2],
+/// Equally spaced samples of the response and of the base.
+#[derive(Debug, Clone)]
+pub struct Signals {
+    /// Displacements, m.
+    pub displacements: [Vec<f64>; 2],
+    /// What the sensors read, over a power of omega0, whose noise is white: the displacements, or their derivatives.
+    pub readings: [Vec<f64>; 2],
     /// Time between samples, s.
     pub sample_time: f64,
 }
 
-impl<'a> Signals<'a> {
-    /// Of displacements.
-    pub fn of_displacements([response, base]: [&'a [f64]; 2], sample_time: f64) -> Self {
-        Self { response, base, readings: [response, base], sample_time }
+impl Signals {
+    /// Of sensors that read displacements.
+    pub fn of_displacements(displacements: [Vec<f64>; 2], sample_time: f64) -> Self {
+        Self { readings: displacements.clone(), displacements, sample_time }
     }
 }
 
@@ -142,13 +118,13 @@ fn averaged(values: &[f64]) -> Vec<f64> {
 impl Record {
     /// Demodulates equally spaced samples. `None` for fewer than twelve periods, or fewer than ten samples in a period.
     pub fn new(signals: &Signals, linear: Linear, power: i32) -> Option<Self> {
-        let Signals { response, base, readings, sample_time } = *signals;
+        let Signals { displacements: [response, base], readings, sample_time } = signals;
         let mean = base.iter().sum::<f64>() / base.len() as f64;
         let moving: Vec<f64> = base.iter().map(|x| x - mean).collect();
         let mut periods = Periods::new(
-            [response, &linear.response(&moving, sample_time), base],
-            readings,
-            sample_time,
+            [response, &linear.response(&moving, *sample_time), base],
+            [&readings[0], &readings[1]],
+            *sample_time,
             linear.omega0,
         )?;
         for (l, omega) in periods.linear.iter_mut().zip(&periods.omega) {

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use vines_estimate::{Estimate, Immediate, Linear, Periods, Record, Signals, probabilities};
+use vines_estimate::{Element, Estimate, Linear, Path, Periods, Record, Signals, probabilities};
 
 mod common;
 use common::noise;
@@ -46,6 +46,27 @@ fn the_fundamental_of_a_decay_is_its_amplitude_at_the_middle_of_each_period() {
     }
 }
 
+/// An element whose force follows at once, and of which nothing else is known.
+struct Immediate;
+
+impl Element for Immediate {
+    fn steady(&self, _: f64) -> Complex64 {
+        Complex64::ZERO
+    }
+
+    fn lag(&self, _: f64) -> Complex64 {
+        Complex64::ZERO
+    }
+
+    fn is_smooth(&self, _: f64) -> bool {
+        true
+    }
+
+    fn along(&self, _: &Path) -> Option<Vec<Vec<(f64, Complex64)>>> {
+        None
+    }
+}
+
 #[test]
 fn a_linear_rig_has_its_own_drive_and_frequency_whatever_linear_response_is_assumed() {
     let rig = Linear { omega0: 1.001 * LINEAR.omega0, zeta: 0.012 };
@@ -57,12 +78,8 @@ fn a_linear_rig_has_its_own_drive_and_frequency_whatever_linear_response_is_assu
     let share = (half.sin() / half).powi(2);
     response.iter_mut().for_each(|y| *y = *y / share + 0.1 * noise());
     let measured: Vec<f64> = base.iter().map(|x| x + 1e-4 * noise()).collect();
-    let record = Record::new(
-        &Signals::of_displacements([&response, &measured], SAMPLE_TIME),
-        LINEAR,
-        0,
-    )
-    .expect("400 periods");
+    let record =
+        Record::new(&Signals::of_displacements([response, measured], SAMPLE_TIME), LINEAR, 0).expect("400 periods");
     // What the rig has beside the assumed response depends on the base as well, so that it is a function of the amplitude in steady motion only: here
     // it moves omega_R by 1e-5, half of the uncertainty at this noise, and by a fourteenth of that where the amplitude changes four times more slowly.
     let used: Vec<bool> = record.periods.time.iter().map(|t| *t > 100.0).collect();

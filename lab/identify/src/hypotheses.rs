@@ -28,7 +28,7 @@ use crate::motions::{AMPLITUDES, Goal, Motions, Place, backbone, uncertainties};
 use crate::particle::Particle;
 use crate::points::MeasuredPoint;
 use crate::quantity::{Known, Quantity, STEP, UNKNOWNS, Unknowns, gradient, moved, unknowns};
-use crate::record::{PASSES, STILL, Source};
+use crate::record::{PASSES, STILL, Samples};
 
 /// What a record says.
 #[derive(Debug, Clone)]
@@ -40,7 +40,9 @@ pub struct MeasuredCurve {
     /// Times, s, and amplitudes of the response, m, of the periods that were used.
     pub periods: Vec<[f64; 2]>,
     /// What it was read from.
-    pub source: Arc<Source>,
+    pub samples: Arc<Samples>,
+    /// The periods that were used.
+    pub used: Vec<bool>,
     /// The particle with which it was read.
     pub read: Particle,
     /// Relative error of the curve beside noise.
@@ -503,7 +505,10 @@ impl Data {
             let frequency = std::array::from_fn(|power| frequency[power]);
             let read = Particle { frequency, ..problem.particle(&fit.x) };
             let curves = self.curves.iter().map(|one| {
-                let curve = one.source.read(read, &itself, linear)?.resolved(one.resolution)?;
+                let curve = one
+                    .samples
+                    .read(&one.used, read, &itself, linear)?
+                    .resolved(one.resolution)?;
                 Some(MeasuredCurve { curve, read, ..one.clone() })
             });
             let data = Self { curves: curves.collect::<Option<_>>()?, ..self.clone() };

@@ -24,6 +24,6 @@ pub use ideal_rig::IdealRig;
 pub use particle::{Particle, Steady};
 pub use points::MeasuredPoint;
 pub use quantity::{Known, Quantity};
-pub use record::{Identified, Samples, Source, Unidentified, identify};
+pub use record::{Identified, Samples, Unidentified, identify};
 pub use regime::{Expected, Likelihoods, MOTIONS, RESOLUTION, TOLERANCES, one_to_one, rough_scene};
 pub use vines_estimate::Signals;

@@ -15,10 +15,10 @@ use crate::quantity::STEP;
 use crate::regime::{Expected, TOLERANCES, one_to_one, rough_scene};
 
 /// A record, and what its sensors are.
-#[derive(Debug, Clone, Copy)]
-pub struct Samples<'a> {
+#[derive(Debug, Clone)]
+pub struct Samples {
     /// Response and base.
-    pub signals: Signals<'a>,
+    pub signals: Signals,
     /// What the response is.
     pub sensor: Sensor,
 }
@@ -48,8 +48,6 @@ pub struct Identified {
     pub read: Particle,
     /// Factor of the particle's lag: 1 if its closed form holds.
     pub lag: Complex64,
-    /// Innovations, of variance 1 if the model holds.
-    pub innovations: Vec<f64>,
     /// Number of passes.
     pub passes: usize,
     /// Whether the linear response stayed.
@@ -156,39 +154,16 @@ fn power(sensor: Sensor) -> i32 {
     }
 }
 
-impl Samples<'_> {
-    fn record(&self, scene: &IdealRig) -> Option<Record> {
-        Record::new(&self.signals, scene.linear(), power(self.sensor))
+impl Samples {
+    fn record(&self, linear: Linear) -> Option<Record> {
+        Record::new(&self.signals, linear, power(self.sensor))
     }
-}
 
-/// The samples of a record, and the periods of them that are read.
-#[derive(Debug, Clone)]
-pub struct Source {
-    /// Response and base, m.
-    pub displacements: [Vec<f64>; 2],
-    /// As [`Signals::readings`].
-    pub readings: [Vec<f64>; 2],
-    /// Time between samples, s.
-    pub sample_time: f64,
-    /// What the response is.
-    pub sensor: Sensor,
-    /// The periods.
-    pub used: Vec<bool>,
-}
-
-impl Source {
-    /// The curve as a rig reads it that has this particle, a backbone, and a linear response.
-    pub(crate) fn read(&self, near: Particle, backbone: &[[f64; 3]], linear: Linear) -> Option<Curve> {
-        let signals = Signals {
-            response: &self.displacements[0],
-            base: &self.displacements[1],
-            readings: [&self.readings[0], &self.readings[1]],
-            sample_time: self.sample_time,
-        };
-        let record = Record::new(&signals, linear, power(self.sensor))?;
+    /// The curve of the periods `used` as a rig reads it that has this particle, a backbone, and a linear response.
+    pub(crate) fn read(&self, used: &[bool], near: Particle, backbone: &[[f64; 3]], linear: Linear) -> Option<Curve> {
+        let record = self.record(linear)?;
         let particle = effective(near, backbone, linear)?;
-        let mut used = self.used.clone();
+        let mut used = used.to_vec();
         used.resize(record.periods.time.len(), false);
         let scale = near.epsilon * near.b;
         let (estimate, solution) = Estimate::of_periods(&record, &particle, scale, &used)?.fit()?;
@@ -214,9 +189,9 @@ pub fn identify(samples: &Samples, rough: &IdealRig) -> Result<Identified, Unide
 }
 
 fn passes(samples: &Samples, rough: &IdealRig, found: &mut BTreeSet<usize>) -> Option<Identified> {
-    let mut scene = rough_scene(&samples.record(rough)?, rough, samples.sensor);
+    let mut scene = rough_scene(&samples.record(rough.linear())?, rough, samples.sensor);
     for pass in 1..=PASSES {
-        let record = samples.record(&scene)?;
+        let record = samples.record(scene.linear())?;
         let near = scene.particle(samples.sensor);
         let particle = effective(near, &scene.backbone(samples.sensor)?, scene.linear())?;
         let scale = scene.epsilon * scene.b;
@@ -249,7 +224,6 @@ fn passes(samples: &Samples, rough: &IdealRig, found: &mut BTreeSet<usize>) -> O
                 motions,
                 read: near,
                 lag: estimate.lag,
-                innovations: solution.innovations,
                 passes: pass,
                 converged,
             });

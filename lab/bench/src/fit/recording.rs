@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
 use vines_estimate::Oscillations;
-use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Source, Unidentified, identify};
+use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Unidentified, identify};
 use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
 use vines_model::{ArgumentError, Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
@@ -295,17 +295,17 @@ impl Recording {
         };
         let readings = [passed(0, &one.response), passed(1, &one.drive)];
         let natural = knowledge.linear.omega0 * sample_time;
-        let [response, base] = [0, 1].map(|channel| displacements(&readings[channel], measurands[channel], natural));
+        let moved = [0, 1].map(|channel| displacements(&readings[channel], measurands[channel], natural));
         // At both ends the drift is not known: running means do not reach there.
         let margin = (0.5 * (SLOW + 3) as f64 * (TAU / knowledge.linear.omega0 / sample_time).round()) as usize;
-        let inner = margin..response.len().saturating_sub(margin).max(margin);
+        let end = one.response.len().saturating_sub(margin).max(margin);
+        let inner = |both: [Vec<f64>; 2]| both.map(|values| values[margin..end].to_vec());
         let signals = Signals {
-            response: &response[inner.clone()],
-            base: &base[inner.clone()],
-            readings: [&readings[0][inner.clone()], &readings[1][inner]],
+            displacements: inner(moved),
+            readings: inner(readings),
             sample_time: *sample_time,
         };
-        let samples = Samples { signals, sensor: scene.definition().sensor };
+        let samples = Arc::new(Samples { signals, sensor: scene.definition().sensor });
         let mut found = identify(&samples, &rough(scene)).map_err(|why| self.without_curve(&why))?;
         found
             .time
@@ -317,21 +317,17 @@ impl Recording {
             .filter(|(_, used)| **used)
             .map(|((time, amplitude), _)| [*time, *amplitude])
             .collect();
-        let (resolution, sensor) = (POINT_RESOLUTION, samples.sensor);
-        let curve = found.curve.resolved(resolution);
-        let curve = curve.ok_or_else(|| self.without_curve(&Unidentified::default()))?;
-        let source = Arc::new(Source {
-            displacements: [signals.response, signals.base].map(<[f64]>::to_vec),
-            readings: signals.readings.map(<[f64]>::to_vec),
-            sample_time: *sample_time,
-            sensor,
+        let curve = found.curve.resolved(POINT_RESOLUTION);
+        let curve = MeasuredCurve {
+            origin: origin.clone(),
+            curve: curve.ok_or_else(|| self.without_curve(&Unidentified::default()))?,
+            periods,
+            samples,
             used: found.used,
-        });
-        let (origin, read) = (origin.clone(), found.read);
-        Ok((
-            MeasuredCurve { origin, curve, periods, source, read, resolution },
-            stretches,
-        ))
+            read: found.read,
+            resolution: POINT_RESOLUTION,
+        };
+        Ok((curve, stretches))
     }
 
     /// Refuses channels of which the response has no oscillation near the natural frequency, and channels that are swapped, or of which one has the
