@@ -296,9 +296,6 @@ struct Sections {
     resonance: Definition,
     rig: RigSection,
     controller_names: Names,
-    /// As of [`Scene`].
-    #[serde(skip)]
-    states_sensor: bool,
 }
 
 /// A rig other than the simulated one.
@@ -316,14 +313,15 @@ impl Sections {
         if let Some(structure) = &structure {
             self.plant = self.plant.of_structure(origin, structure)?;
             resonance.sensor = Sensor::Q1;
-            self.states_sensor = true;
         }
         let plant = self.plant.resolve(origin)?;
+        let is_given = |section: &str, key: &str| table.get(section).is_some_and(|keys| keys.get(key).is_some());
         let numbers = Dimensionless::of(&plant, 0.0);
         let mut scene = Scene {
             start: self.start.resolve(origin, &plant, structure.as_ref())?,
             amplitude: self.excitation.in_metres(origin, &numbers, structure.as_ref())?,
             plant,
+            states_sensor: structure.is_some() || is_given("resonance", "sensor"),
             structure,
             controller: self.controller,
             phase_lock: self.phase_lock,
@@ -331,12 +329,10 @@ impl Sections {
             backbone: self.backbone,
             chain: self.chain,
             resonance,
-            states_sensor: self.states_sensor,
             rig_names: self.rig.names,
             controller_names: self.controller_names,
         };
-        let controller = table.get("controller");
-        if controller.and_then(|keys| keys.get("samples_per_period")).is_none() {
+        if !is_given("controller", "samples_per_period") {
             scene.controller.samples_per_period *= scene.oversampling();
         }
         checks::check(&scene, origin)?;

@@ -55,10 +55,6 @@ impl Override {
         SceneError::Override { argument: self.argument.clone(), message: message.into() }
     }
 
-    fn is(&self, section: &str, key: &str) -> bool {
-        self.section == section && self.key == key
-    }
-
     fn merge_into(&self, scene: &mut Table) -> Result<(), SceneError> {
         let section = scene.entry(&self.section).or_insert_with(|| Value::Table(Table::new()));
         let Value::Table(section) = section else {
@@ -80,7 +76,11 @@ impl Override {
 /// `table` with the overrides applied one by one, so that an error names the argument that caused it; a new section, which may need several keys, is
 /// checked with the last of them.
 pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, SceneError> {
-    let sets = |key| overrides.iter().find(|change| change.is("excitation", key));
+    let sets = |key| {
+        overrides
+            .iter()
+            .find(|change| change.section == "excitation" && change.key == key)
+    };
     if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
         return Err(second.error("excitation.G is set as well: set one of them"));
     }
@@ -102,20 +102,19 @@ pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(
     let syntax = |error: toml::de::Error| SceneError::text(origin, plain(&error.to_string()));
     // The file is checked on its own first, so that an error can name the line.
     toml::from_str::<Sections>(text).map_err(syntax)?;
-    let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;
-    let mut sections = Sections::deserialize(table.clone()).map_err(syntax)?;
-    sections.states_sensor = states_sensor(text, &table, overrides);
-    let scene = sections.resolve(origin, &table)?;
+    let mut table: Table = toml::from_str(text).map_err(syntax)?;
+    // The default scene does not say what a sensor reads: its key is there for readers, and has the default.
+    if text == PAPER
+        && let Some(Value::Table(resonance)) = table.get_mut("resonance")
+    {
+        resonance.remove("sensor");
+    }
+    let table = merge(table, overrides)?;
+    let scene = Sections::deserialize(table.clone())
+        .map_err(syntax)?
+        .resolve(origin, &table)?;
     scene.check_controller()?;
     Ok((scene, table))
-}
-
-/// Whether a scene other than the default one, or an override, has `resonance.sensor`.
-fn states_sensor(text: &str, table: &Table, overrides: &[Override]) -> bool {
-    let is_in_table = table
-        .get("resonance")
-        .is_some_and(|section| section.get("sensor").is_some());
-    text != PAPER && is_in_table || overrides.iter().any(|change| change.is("resonance", "sensor"))
 }
 
 // A scene some of whose numbers vary.
@@ -126,8 +125,6 @@ pub struct Family {
     origin: String,
     /// The file with its overrides.
     table: Table,
-    /// As of [`Scene`].
-    states_sensor: bool,
     /// Section and key of every number that varies.
     keys: Vec<[String; 2]>,
 }
@@ -136,13 +133,8 @@ impl Family {
     /// Reads a scene from `text`, or the default scene without one; nothing varies yet.
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
-        let (Scene { states_sensor, .. }, table) = read(origin, text, overrides)?;
-        Ok(Self {
-            origin: origin.into(),
-            table,
-            states_sensor,
-            keys: Vec::new(),
-        })
+        let (_, table) = read(origin, text, overrides)?;
+        Ok(Self { origin: origin.into(), table, keys: Vec::new() })
     }
 
     /// Lets the number under `section.key` vary too.
@@ -168,9 +160,9 @@ impl Family {
             }
         }
         let refused = |error: toml::de::Error| SceneError::text(&self.origin, plain(error.message()));
-        let mut sections = Sections::deserialize(table.clone()).map_err(refused)?;
-        sections.states_sensor = self.states_sensor;
-        sections.resolve(&self.origin, &table)
+        Sections::deserialize(table.clone())
+            .map_err(refused)?
+            .resolve(&self.origin, &table)
     }
 }
 
