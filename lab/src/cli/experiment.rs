@@ -175,17 +175,13 @@ impl ExperimentArguments {
         files: Result<Vec<(N, C)>, Failure>,
         failure: Option<Failure>,
     ) -> Result<Results, Failure> {
-        let json = self.json;
-        let text = output(json, result, || format!("{text}\n"))?;
-        Ok(Results::new(text, move || {
+        let text = output(self.json, result, || format!("{text}\n"))?;
+        Ok(Results::new(text, self.json, move || {
             let Ended { folder, recorded, timing, .. } = ended;
             let mut written = Written::default();
             written.failures.extend(failure);
             written.add(files.and_then(|files| Ok(folder.replace(files)?)));
             written.add(recorded);
-            if json {
-                written.paths.clear();
-            }
             let doubt = |share: f64| match &timing {
                 None => None,
                 Some(Ok(timing)) => timing.doubt(share),

@@ -298,7 +298,7 @@ pub(super) fn run(
             )));
         }
         let text = output(arguments.json, &serde_json::json!({ "notes": notes }), || lines(&notes))?;
-        return Ok(Results::new(text, Written::default));
+        return Ok(text.into());
     }
     let bar = progress_bar(Hypothesis::ALL.len() as u64, "fitting", "hypotheses");
     let found = find(&measured, &scene, |done| bar.set_position(done as u64));
@@ -325,10 +325,10 @@ pub(super) fn run(
         ]
         .concat()
     })?;
-    let Arguments { figure, out, json, .. } = arguments.clone();
+    let Arguments { figure, out, .. } = arguments.clone();
     let plant = plant_section(&report, &found.plant(&scene.plant));
     let scene_text = provenance(&arguments.points, &report) + &arguments.scene.with_plant(&plant)?;
-    Ok(Results::new(text, move || {
+    Ok(Results::new(text, arguments.json, move || {
         let mut files = Written::default();
         if let Some(path) = &figure {
             let figure = fitted(&found, &scene).svg();
@@ -336,9 +336,6 @@ pub(super) fn run(
         }
         if let Some(path) = &out {
             files.add(vines::write_file(path, &scene_text).map(Some));
-        }
-        if json {
-            files.paths.clear();
         }
         if !report.describes {
             files

@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let bar = progress_bar(map.size(), "mapping regimes", "cells");
     map.run(*confirmations, || bar.inc(1))?;
     bar.finish_and_clear();
-    Ok(Results::new(format!("{}\n", summary(&map)), move || {
+    Ok(Results::new(format!("{}\n", summary(&map)), false, move || {
         let mut written = Written::default();
         let files = report::map_files(&map).map_err(Failure::from);
         written.add(files.and_then(|files| Ok(folder.replace(files)?)));

@@ -58,6 +58,8 @@ pub(super) fn stability(stable: bool, neutral: bool) -> &'static str {
 /// What a command has found, and what is left to do once that has been printed: a full disk hides no result.
 pub(super) struct Results {
     text: String,
+    /// The text is for programs, and says nothing of the files.
+    json: bool,
     write: Box<dyn FnOnce() -> Written>,
 }
 
@@ -79,13 +81,13 @@ impl Written {
 
 impl From<String> for Results {
     fn from(text: String) -> Self {
-        Self::new(text, Written::default)
+        Self::new(text, false, Written::default)
     }
 }
 
 impl Results {
-    pub(super) fn new(text: String, write: impl FnOnce() -> Written + 'static) -> Self {
-        Self { text, write: Box::new(write) }
+    pub(super) fn new(text: String, json: bool, write: impl FnOnce() -> Written + 'static) -> Self {
+        Self { text, json, write: Box::new(write) }
     }
 
     /// With a figure, if there is a file for it.
@@ -95,12 +97,9 @@ impl Results {
         file: Option<PathBuf>,
         draw: impl FnOnce() -> String + 'static,
     ) -> Self {
-        Self::new(text, move || {
+        Self::new(text, json, move || {
             let mut written = Written::default();
             written.add(file.map(|file| vines::write_file(&file, &draw())).transpose());
-            if json {
-                written.paths.clear();
-            }
             written
         })
     }
@@ -110,23 +109,27 @@ impl Results {
         // The files of a result are replaced together.
         let _orderly = Orderly::new();
         let printed = print(&self.text);
-        let Written { paths, mut failures } = (self.write)();
-        if !paths.is_empty() {
-            failures.extend(print(&written(&paths)).err());
-        }
+        let (files, mut failures) = Self::written(self.json, self.write);
+        failures.extend(print(&files).err());
         failures.extend(printed.err());
         Failure::first_of(failures).map_or(Ok(()), Err)
     }
 
     /// What [`Self::show`] prints, and the failures of writing the files.
     pub(super) fn texts(self) -> (String, Option<Failure>) {
-        let Written { paths, failures } = (self.write)();
-        let files = if paths.is_empty() {
+        let (files, failures) = Self::written(self.json, self.write);
+        (self.text + &files, Failure::first_of(failures))
+    }
+
+    /// Writes the files. Returns what to print of them, and what has failed.
+    fn written(json: bool, write: Box<dyn FnOnce() -> Written>) -> (String, Vec<Failure>) {
+        let Written { paths, failures } = write();
+        let text = if json || paths.is_empty() {
             String::new()
         } else {
             written(&paths)
         };
-        (self.text + &files, Failure::first_of(failures))
+        (text, failures)
     }
 }
 
