@@ -70,15 +70,10 @@ fn phase_in_words(error: Option<f64>) -> String {
     )
 }
 
-/// What the amplitude of a drive in this unit is called.
-fn symbol_of(unit: &str) -> &'static str {
-    if unit == "N" { "F" } else { "E" }
-}
-
 /// A drive in metres of the oscillator beside the requested amplitude, in the unit of the reference, in words.
 fn drive_in_words(drive: Drive, plan: &Plan) -> String {
     let unit = plan.knowledge.target.units.reference;
-    let symbol = symbol_of(unit.symbol);
+    let symbol = unit.amplitude();
     let present = if symbol == "F" { "force" } else { "displacement" };
     let (of, metres) = match drive.amplitude {
         0.0 => (format!("{symbol} = 0, but a {present} of"), drive.displacement.abs()),
@@ -484,7 +479,7 @@ fn checked(command: Command, reference: Unit) -> Result<Command, ExperimentError
     let angular = |value, unit| Quantity { value, unit };
     for (name, value, is_signed) in [
         ("omega", angular(omega, "rad/s"), false),
-        (symbol_of(reference.symbol), reference.quantity(amplitude), false),
+        (reference.amplitude(), reference.quantity(amplitude), false),
         ("drive", reference.quantity(displacement), true),
         ("phase_error", angular(command.phase_error.unwrap_or(0.0), "rad"), true),
     ] {

@@ -253,6 +253,14 @@ pub fn noise_at(values: &[f64], stride: usize, [one, two, three]: [f64; 3]) -> f
     (mean_square(differences) / variance).sqrt()
 }
 
+/// Weights of the values at some places in the polynomial through all of them (Lagrange), at `x`.
+pub fn lagrange(places: &[f64], x: f64) -> impl Iterator<Item = f64> {
+    places.iter().enumerate().map(move |(i, place)| {
+        let others = places.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, other)| (x - other) / (place - other)).product()
+    })
+}
+
 /// Slope of the straight line that fits equally spaced values best, from a value to the next.
 pub fn slope(values: &[f64]) -> f64 {
     let n = values.len() as f64;

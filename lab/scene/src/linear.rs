@@ -88,6 +88,8 @@ impl MeasuredLinear {
 // A stable symmetric 1:1 motion has |χ| = (4/π) B/C, and to first order in epsilon |χ| > 1 and |χ - 1| > 1: it lies outside, measured
 // from either state.
 
+/// Largest relative error of the half-width in a drawing.
+pub const DRAWING: f64 = 0.1;
 /// Largest mass ratio of a rig over the ratio in its drawing, whose masses are known within a fifth.
 const LARGEST_RATIO: f64 = 1.0 / (1.0 - 0.2);
 

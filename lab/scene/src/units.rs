@@ -40,6 +40,11 @@ impl Unit {
         Quantity { value: self.of_metres(metres), unit: self.symbol }
     }
 
+    /// What the amplitude of a drive in this unit is called.
+    pub fn amplitude(self) -> &'static str {
+        if self.symbol == "N" { "F" } else { "E" }
+    }
+
     /// A drive in this unit, as the motion of a base or as a force: in files they have different names.
     pub fn base_or_force<T>(self, drive: T) -> [Option<T>; 2] {
         match self.symbol {

@@ -134,13 +134,10 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
         };
         text += &format!("Different from the scene: {name} is {measured} {unit}, not {expected}; {consequence}.\n");
     }
-    let symbol = match scene.structure.as_ref().map(|structure| structure.excitation) {
-        Some(Reference::Force) => "F",
-        _ => "E",
-    };
-    let unit = scene.units().reference.symbol;
+    let unit = scene.units().reference;
     let verdict = named(&checked.verdict.to_string(), scene);
-    text += &format!("At {symbol} = {:.2e} {unit}: {verdict}\n", checked.amplitude);
+    let (name, symbol) = (unit.amplitude(), unit.symbol);
+    text += &format!("At {name} = {:.2e} {symbol}: {verdict}\n", checked.amplitude);
     if checked.is_raised() {
         text += &format!(
             "The noise of the sensors needed {:.0} % of the drive; the check took {:.0} periods.\n",

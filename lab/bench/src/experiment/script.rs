@@ -14,7 +14,7 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
-use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
+use vines_model::numerics::{Estimate, SIGNIFICANT, lagrange, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, Stage};
 use crate::identification::{
@@ -24,7 +24,7 @@ use crate::identification::{
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
 use vines_rig::unit::short;
 use vines_scene::knowledge::Knowledge;
-use vines_scene::linear::POINT_RESOLUTION;
+use vines_scene::linear::{DRAWING, POINT_RESOLUTION};
 use vines_scene::scene::Units;
 use vines_scene::shaker_path::{BANDWIDTH, ShakerPath};
 
@@ -36,8 +36,6 @@ const LEG_CHANGE: f64 = 0.04;
 const MOVE_SHARE: f64 = 0.8;
 /// Duration of a rise of the response by the half-width, periods.
 const RISE: f64 = 60.0;
-/// Largest relative error of the half-width in the drawing.
-const DRAWING: f64 = 0.1;
 /// Largest and smallest response of the script over the half-width: a particle that moves freely has hit the walls, and the fold of r = 0.85 is larger.
 const RESPONSES: [f64; 2] = [1.5, 0.05];
 /// Largest such steepness that legs follow: with less than half a percent, the loops' own transients would count as a change.
@@ -615,13 +613,9 @@ pub(crate) fn is_reached(Estimate { value, uncertainty }: Estimate, level: f64) 
 /// Drive, m, and frequency, rad/s, at the amplitude `response`, m, on the polynomial through the last points, three at most; `None` without any.
 fn extrapolated(points: &[Held], response: f64) -> Option<[f64; 2]> {
     let points = &points[points.len().saturating_sub(3)..];
-    let weights = points.iter().enumerate().map(|(i, point)| {
-        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        others
-            .map(|(_, previous)| (response - previous[0]) / (point[0] - previous[0]))
-            .product::<f64>()
-    });
-    let expected = points.iter().zip(weights).fold([0.0; 2], |sum, (point, weight)| {
+    let responses: Vec<f64> = points.iter().map(|point| point[0]).collect();
+    let weighted = points.iter().zip(lagrange(&responses, response));
+    let expected = weighted.fold([0.0; 2], |sum, (point, weight)| {
         [sum[0] + weight * point[1], sum[1] + weight * point[2]]
     });
     (!points.is_empty() && expected.iter().all(|value| value.is_finite())).then_some(expected)

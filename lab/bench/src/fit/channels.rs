@@ -2,7 +2,7 @@
 
 use std::ops::Deref;
 
-use vines_model::numerics::{golden_section, mean, mean_square, range, slope};
+use vines_model::numerics::{golden_section, lagrange, mean, mean_square, range, slope};
 use vines_model::{ArgumentError, Measurand};
 
 use super::recording::Recording;
@@ -645,12 +645,8 @@ fn interpolated(times: &[f64], values: &[f64], at: impl Iterator<Item = f64>) ->
         while from + 4 < times.len() && times[from + 2] <= time {
             from += 1;
         }
-        let four = from..from + 4;
-        let weight = |i: usize| -> f64 {
-            let others = four.clone().filter(|j| *j != i);
-            others.map(|j| (time - times[j]) / (times[i] - times[j])).product()
-        };
-        four.clone().map(|i| values[i] * weight(i)).sum()
+        let weights = lagrange(&times[from..from + 4], time).zip(&values[from..]);
+        weights.map(|(weight, value)| value * weight).sum()
     })
     .collect()
 }

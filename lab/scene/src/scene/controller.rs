@@ -13,7 +13,7 @@ use vines_model::ArgumentError;
 use vines_rig::unit::rounded;
 
 use crate::knowledge::Knowledge;
-use crate::linear::LinearResponse;
+use crate::linear::{DRAWING, LinearResponse};
 use crate::units::{Unit, Units};
 
 use super::checks::{Range, Row};
@@ -243,7 +243,8 @@ impl Scene {
     /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
     fn drive_needed(&self, knowledge: &Knowledge) -> f64 {
         let linear = knowledge.linear.bandwidth().max(BANDWIDTH_MIN);
-        self.amplitude.max(IMPACTS * linear * knowledge.numbers.b)
+        // A particle at rest in the middle is hit at the amplitude b.
+        self.amplitude.max((1.0 + DRAWING) * linear * knowledge.numbers.b)
     }
 
     /// Largest drive, m, that the converters of the base can show; infinite without them.
@@ -302,8 +303,6 @@ const TRACKED: f64 = 4.0;
 const BANDWIDTH_MIN: f64 = 1e-4;
 /// Share of the amplitude by which a reading may differ from its prediction: a resonant response changes slowly.
 const RESIDUAL: f64 = 0.3;
-/// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.
-const IMPACTS: f64 = 1.1;
 
 // The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
