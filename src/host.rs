@@ -151,7 +151,7 @@ impl Equations {
 type Rounded = (f64, f64);
 
 /// A linear structure.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Host {
     excitation: Excitation,
     /// The sections while the particle is free.
@@ -169,7 +169,7 @@ pub struct Host {
 }
 
 /// `eta'' + Delta eta' + diag(omega²) eta = g u + h u' + phi f`, in mass-normalised modal coordinates.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Modal {
     /// `omega²` with its rounding error, 1/s².
     pub stiffness: Vec<(f64, f64)>,
@@ -188,7 +188,7 @@ pub(crate) struct Modal {
 }
 
 /// First-order states: `z' = b u - E z - S eta'`, with the forces `G z` on the modal coordinates.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Beside {
     /// `E`.
     rates: DMatrix<f64>,
@@ -755,7 +755,7 @@ fn shapes_without_damping(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Resu
 // Complex pairs and pairs of real poles
 
 /// The modal coordinates, their momenta and the first-order states from the sections of a set, and back. A momentum is `p = eta' - h u`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Expansion {
     /// `(x, v)` of every section from `eta`, `p` and `z`, and the part of `u`.
     pub to_sections: DMatrix<f64>,

@@ -176,7 +176,7 @@ impl Map {
     /// The cell at these values of x and y.
     fn cell(&self, place: &[f64; 2], confirmations: usize) -> Result<MapCell, CellError> {
         let (numbers, sigma, start) = self.inputs(place)?;
-        let (mut result, differing) = observe_confirmed(&numbers, sigma, start, self.common.periods(), confirmations)?;
+        let (mut result, differing) = observe_confirmed(&numbers, sigma, start, self.common.periods, confirmations)?;
         let mut coexisting = Vec::new();
         if let Some(regime) = differing {
             coexisting.extend([result.regime, regime]);
@@ -204,7 +204,7 @@ impl Map {
             g: [g.from, g.to],
             ..ContinuationLimits::default()
         };
-        bifurcation_curves(&self.common.scene().dimensionless(), &limits)
+        bifurcation_curves(&self.common.scene.dimensionless(), &limits)
     }
 
     /// Names of the axes, horizontal first: sigma, G, r, or a key of the scene.

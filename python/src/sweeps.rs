@@ -177,7 +177,7 @@ impl Cells {
         let asks = |group| self.groups.contains(&group);
         let computed = self.cells.at(values).and_then(|Cell { scene, sigma, numbers }| {
             let mut run = CellRun::new(&numbers, sigma, scene.dimensionless_start())?.stopped_by(Arc::clone(stop));
-            let result = run.decided(0, self.cells.periods())?;
+            let result = run.decided(0, self.cells.periods)?;
             let response = asks("response").then(|| run.response(&result)).transpose()?;
             let (lock, failure) = match asks("lock").then(|| locked(&scene, stop)).transpose() {
                 Ok(lock) => (lock, String::new()),

@@ -40,10 +40,12 @@ pub enum CellError {
 #[derive(Debug, Clone)]
 pub struct Cells {
     family: Family,
-    scene: Scene,
+    /// The scene without the values of the axes.
+    pub scene: Scene,
     keys: Vec<String>,
     sigma: f64,
-    periods: usize,
+    /// Largest number of periods that a cell is followed.
+    pub periods: usize,
 }
 
 /// The scene of a cell, its detuning and its dimensionless numbers.
@@ -85,19 +87,9 @@ impl Cells {
         Ok(Self { family, scene, keys: keys.into(), sigma, periods })
     }
 
-    /// The scene without the values of the axes.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
     /// The detuning, unless it varies.
     pub fn sigma(&self) -> Option<f64> {
         (!self.keys.iter().any(|key| key == SIGMA)).then_some(self.sigma)
-    }
-
-    /// Largest number of periods that a cell is followed.
-    pub fn periods(&self) -> usize {
-        self.periods
     }
 
     /// The cell with these values, one per key.

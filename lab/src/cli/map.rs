@@ -82,13 +82,13 @@ pub(super) const FILES: [&str; 3] = ["map.csv", "map.svg", "bifurcations.csv"];
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     let Arguments { x, y, sigma, periods, confirmations, out, .. } = arguments;
     let mut map = Map::new(arguments.scene.family()?, x, y, *sigma, *periods)?;
-    if let Some(structure) = &map.common.scene().structure {
+    if let Some(structure) = &map.common.scene.structure {
         return Err(Failure::input(format!(
             "a regime map is of one oscillator: the scene has a {}; drop it, and give M, k and c",
             structure.section()
         )));
     }
-    warn_left_out(map.common.scene().left_out(), "a regime map is");
+    warn_left_out(map.common.scene.left_out(), "a regime map is");
     let folder = results(out, &FILES)?;
     let bar = progress_bar(map.size(), "mapping regimes", "cells");
     map.run(*confirmations, || bar.inc(1))?;
@@ -105,7 +105,7 @@ fn summary(map: &Map) -> String {
     let Map { x, y, .. } = map;
     let mut text = format!(
         "Regimes over {x} and {y}\n  {}\n\n{}",
-        parameters(&map.common.scene().dimensionless()),
+        parameters(&map.common.scene.dimensionless()),
         regimes(map).text()
     );
     if !map.curves.is_empty() {

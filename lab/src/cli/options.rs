@@ -46,13 +46,6 @@ impl SceneArguments {
         Ok(scene)
     }
 
-    /// The scene, for results of the ideal cavity: a warning says what they leave out.
-    pub(super) fn load_for(&self, results: &str) -> Result<Scene, SceneError> {
-        let scene = self.load()?;
-        warn_left_out(scene.left_out(), results);
-        Ok(scene)
-    }
-
     /// The text of the scene's file with another section `[plant]`, and without comments: they may be about the plant that it had.
     pub(super) fn with_plant(&self, plant: &str) -> Result<String, SceneError> {
         let text = self.text()?.unwrap_or_else(|| PAPER.into());

@@ -9,7 +9,7 @@ use vines::theory::{Activation, B_SYMMETRY_BREAKING, BranchSide, SlowFlow, backb
 use vines::{cells, report::theory};
 
 use super::failure::Failure;
-use super::options::{SceneArguments, positive_frequency};
+use super::options::{SceneArguments, positive_frequency, warn_left_out};
 use super::output::{Results, output, writable};
 use super::summary::parameters;
 
@@ -50,7 +50,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
     writable(&arguments.figure)?;
-    let scene = arguments.scene.load_for("theory is")?.dimensionless();
+    let loaded = arguments.scene.load()?;
+    warn_left_out(loaded.left_out(), "theory is");
+    let scene = loaded.dimensionless();
     let flow = SlowFlow::new(scene.lambda, scene.r);
     if let Some(sigma) = arguments.sigma {
         positive_frequency("--sigma", &scene, sigma)?;

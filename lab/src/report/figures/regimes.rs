@@ -49,7 +49,7 @@ fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
 }
 
 fn caption(map: &Map) -> String {
-    let numbers = map.common.scene().dimensionless();
+    let numbers = map.common.scene.dimensionless();
     let Dimensionless { epsilon, lambda, g, r, .. } = numbers;
     let sigma = map.common.sigma().map(|sigma| format!(", σ = {sigma:.4}"));
     let free = |name: &str| !map.names().contains(&name);
@@ -62,7 +62,7 @@ fn caption(map: &Map) -> String {
     };
     format!(
         "ε = {epsilon:.5}, λ = {lambda:.3}{held}{dashed}\neach cell from the same start, followed until it repeats, at most {} periods",
-        map.common.periods()
+        map.common.periods
     )
 }
 
