@@ -4,12 +4,12 @@
 use serde::Serialize;
 use vines_model::Dimensionless;
 use vines_model::orbit::{
-    self, Orbit, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit,
-    StructureOrbits, StructureRange, at_amplitude,
+    Orbit, OrbitCurve, SEARCHED, StabilityChange, StructureBranch, StructureFacts, StructureOrbit, StructureOrbits,
+    StructureRange, at_amplitude,
 };
 
 use crate::fit::{self, Contradiction, MeasuredPoint};
-use vines_scene::scene::{Scene, Structure, Units};
+use vines_scene::scene::{Scene, Structure};
 
 /// Points of a computed curve: at the size of a figure, neighbours are at most a few pixels apart.
 pub const CURVE_POINTS: usize = 400;
@@ -110,103 +110,106 @@ fn with_response(orbits: &StructureOrbits, response: f64, omega: f64) -> Option<
     orbits.at_response(response, [omega, near.speed])
 }
 
-/// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
-pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
-    let Some((structure, drive)) = scene.structure.as_ref().zip(scene.structure_drive()) else {
-        return orbit::phase_resonant(numbers);
-    };
-    let found = scene.orbits_of(structure).resonant(drive, scene.frequencies());
-    found
-        .iter()
-        .map(|orbit| of_driven_mode(orbit, structure, numbers))
-        .collect()
-}
-
-/// A scene's structure and its exact backbone; `None` for one oscillator.
-fn backbone_of(scene: &Scene) -> Option<(&Structure, Vec<StructureBranch>)> {
-    let structure = scene.structure.as_ref()?;
-    let orbits = scene.orbits_of(structure);
-    // Other modes may have the motion that the loop finds.
-    let range = orbits
-        .range(section_of(structure), CURVE_POINTS)?
-        .with(scene.frequencies());
-    Some((structure, orbits.backbone(&range)))
-}
-
-/// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
-pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
-    let (structure, branches) = backbone_of(scene)?;
-    let told = |orbit: &StructureOrbit| of_driven_mode(orbit, structure, numbers);
-    let curve = |branch: &StructureBranch| branch.orbits.iter().map(told).collect();
-    Some(branches.iter().map(curve).collect())
-}
-
-/// The stable orbits of a scene's exact backbone, with those where its stable stretches begin and end.
-pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
-    let Some((structure, branches)) = backbone_of(scene) else {
-        let stable = orbit::stable_backbone(numbers, DETUNINGS, CURVE_POINTS);
-        return stable.into_iter().flatten().collect();
-    };
-    let stable = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
-    stable
-        .flatten()
-        .map(|orbit| of_driven_mode(orbit, structure, numbers))
-        .collect()
-}
-
-/// The exact orbits of a scene at phase resonance, one by one, in the numbers of its oscillator or driven mode.
+/// The exact orbits of a scene, one by one, in the numbers of its oscillator or driven mode. An oscillator is a structure of one section, with units of
+/// its own.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ExactOrbits {
+    orbits: StructureOrbits,
     numbers: Dimensionless,
-    /// Of a structure: its orbits, and the units of its channels.
-    structure: Option<(StructureOrbits, Units)>,
+    /// Amplitude of the drive.
+    drive: f64,
+    /// Base of the oscillator per reference, and displacement at the sensor per response of the oscillator.
+    per_unit: [f64; 2],
 }
 
 impl ExactOrbits {
     /// Those of the oscillator or the structure of a scene.
     pub(crate) fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
-        let structure = scene.structure.as_ref();
-        let structure = structure.map(|structure| (scene.orbits_of(structure), structure.units()));
-        Self { numbers: *numbers, structure }
+        let Some((structure, drive)) = scene.structure.as_ref().zip(scene.structure_drive()) else {
+            return Self::of_oscillator(numbers);
+        };
+        let units = structure.units();
+        Self {
+            orbits: scene.orbits_of(structure),
+            numbers: *numbers,
+            drive,
+            per_unit: [units.reference.in_metres(1.0), units.response.of_metres(1.0)],
+        }
     }
 
     /// Those of an oscillator.
     pub(crate) fn of_oscillator(numbers: &Dimensionless) -> Self {
-        Self { numbers: *numbers, structure: None }
+        Self {
+            orbits: StructureOrbits::of(numbers),
+            numbers: Dimensionless { omega0: 1.0, b: 1.0, ..*numbers },
+            drive: numbers.epsilon * numbers.g,
+            per_unit: [1.0; 2],
+        }
     }
 
-    /// The orbit with the response C, near a detuning and a speed of the particle.
+    /// An orbit in these numbers: C is the response over that of the mode with the amplitude b at the cavity.
+    fn told(&self, orbit: &StructureOrbit) -> Orbit {
+        let [per_drive, per_response] = self.per_unit;
+        orbit.in_numbers(&self.numbers, per_drive, per_response)
+    }
+
+    /// The orbit at phase resonance with the response C, near a detuning and a speed of the particle.
     pub(crate) fn with_amplitude(&self, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
         let d = &self.numbers;
-        let Some((orbits, units)) = &self.structure else {
-            return orbit::with_amplitude(d, c, [sigma, speed]);
-        };
         let near = [d.omega(sigma), speed * d.b * d.omega0];
-        let found = orbits.at_response(units.response.of_metres(c * d.b), near)?;
-        let [per_drive, per_response] = per_unit(units);
-        Some(found.in_numbers(d, per_drive, per_response))
+        let found = self.orbits.at_response(c * d.b * self.per_unit[1], near)?;
+        Some(self.told(&found))
+    }
+
+    /// The exact backbone of the scene, over the detunings of its structure or of one oscillator.
+    fn backbone(&self, scene: &Scene) -> Vec<StructureBranch> {
+        let range = match &scene.structure {
+            // Other modes may have the motion that the loop finds.
+            Some(structure) => {
+                let range = self.orbits.range(section_of(structure), CURVE_POINTS);
+                range.map(|range| range.with(scene.frequencies()))
+            }
+            None => Some(StructureRange::at_any_speed(&self.numbers, DETUNINGS, CURVE_POINTS)),
+        };
+        range.map_or(Vec::new(), |range| self.orbits.backbone(&range))
     }
 }
 
-/// Curves of the exact symmetric 1:1 orbits of a scene's structure at these detunings: at phase resonance, or the frequency response under the
-/// scene's drive. `None` for one oscillator.
-pub fn structure_curves(
-    scene: &Scene,
-    numbers: &Dimensionless,
-    sigma: [f64; 2],
-    is_response: bool,
-) -> Option<Vec<OrbitCurve>> {
-    let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
-    let range = StructureRange::at_any_speed(numbers, sigma, CURVE_POINTS);
+/// The exact phase-resonant orbits of a scene under its drive, by rising C; `numbers` are those of its oscillator or driven mode.
+pub fn phase_resonant(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
+    let exact = ExactOrbits::of(scene, numbers);
+    let searched = scene.structure.as_ref().map_or(SEARCHED, |_| scene.frequencies());
+    let found = exact.orbits.resonant(exact.drive, searched);
+    found.iter().map(|orbit| exact.told(orbit)).collect()
+}
+
+/// The exact backbone of a scene's structure, curve by curve; `None` for one oscillator.
+pub fn structure_backbone(scene: &Scene, numbers: &Dimensionless) -> Option<Vec<Vec<Orbit>>> {
+    scene.structure.as_ref()?;
+    let exact = ExactOrbits::of(scene, numbers);
+    let branches = exact.backbone(scene).into_iter();
+    let curve = |branch: StructureBranch| branch.orbits.iter().map(|orbit| exact.told(orbit)).collect();
+    Some(branches.map(curve).collect())
+}
+
+/// The stable orbits of a scene's exact backbone, with those where its stable stretches begin and end.
+pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
+    let exact = ExactOrbits::of(scene, numbers);
+    let branches = exact.backbone(scene);
+    let stable = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
+    stable.flatten().map(|orbit| exact.told(orbit)).collect()
+}
+
+/// Curves of the exact symmetric 1:1 orbits of a scene at these detunings: at phase resonance, or the frequency response under the scene's drive.
+pub fn curves(scene: &Scene, numbers: &Dimensionless, sigma: [f64; 2], is_response: bool) -> Vec<OrbitCurve> {
+    let ExactOrbits { orbits, numbers, drive, per_unit } = ExactOrbits::of(scene, numbers);
+    let range = StructureRange::at_any_speed(&numbers, sigma, CURVE_POINTS);
     let branches = match is_response {
-        true => orbits.frequency_response(scene.structure_drive()?, &range),
+        true => orbits.frequency_response(drive, &range),
         false => orbits.backbone(&range),
     };
-    let [per_drive, per_response] = per_unit(&structure.units());
-    let told = branches
-        .iter()
-        .map(|branch| branch.in_numbers(numbers, per_drive, per_response));
-    Some(told.collect())
+    let told = |branch: &StructureBranch| branch.in_numbers(&numbers, per_unit[0], per_unit[1]);
+    branches.iter().map(told).collect()
 }
 
 /// Detunings of a structure's backbone and of the frequencies that the controller may set.
@@ -225,13 +228,13 @@ pub fn without_other_modes(scene: &Scene, points: Vec<MeasuredPoint>) -> Vec<Mea
     let Some(structure) = scene.structure.as_ref().filter(is_more) else {
         return points;
     };
-    let orbits = scene.orbits_of(structure);
+    let exact = ExactOrbits::of(scene, &scene.dimensionless());
     let moved = |mut point: MeasuredPoint| {
         let definition = scene.definition().at_phase(point.phase);
         let numbers = Dimensionless { definition, ..scene.dimensionless() };
         let response = structure.units().response.of_metres(point.response.value);
-        let all = with_response(&orbits.clone().with_target(point.phase), response, point.omega.value)?;
-        let all = of_driven_mode(&all, structure, &numbers);
+        let orbits = exact.orbits.clone().with_target(point.phase);
+        let all = exact.told(&with_response(&orbits, response, point.omega.value)?);
         let alone = at_amplitude(&numbers, point.response.value / numbers.b)?;
         point.omega.value += numbers.omega0 * (alone.omega - all.omega);
         point.drive.value += numbers.amplitude(alone.g - all.g);
@@ -248,17 +251,6 @@ pub fn contradiction(scene: &Scene, points: Vec<MeasuredPoint>) -> Option<Contra
     }
     let points = without_other_modes(scene, points);
     fit::contradiction(&points, scene.definition(), &scene.plant)
-}
-
-/// An orbit of a structure in the numbers of its driven mode: C is the response over that of the mode with the amplitude b at the cavity.
-fn of_driven_mode(orbit: &StructureOrbit, structure: &Structure, numbers: &Dimensionless) -> Orbit {
-    let [per_drive, per_response] = per_unit(&structure.units());
-    orbit.in_numbers(numbers, per_drive, per_response)
-}
-
-/// Base of the oscillator per reference, and displacement at the sensor per response of the oscillator.
-fn per_unit(units: &Units) -> [f64; 2] {
-    [units.reference.in_metres(1.0), units.response.of_metres(1.0)]
 }
 
 /// The section of the driven mode: the nearest in frequency.

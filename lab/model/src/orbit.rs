@@ -35,7 +35,7 @@ pub use structure::{
 };
 pub use study::{
     at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone, stable_resonant,
-    symmetric_orbits, with_amplitude,
+    symmetric_orbits,
 };
 pub use symmetric::Particle;
 

@@ -10,12 +10,12 @@ use serde_json::json;
 use vines::comparison::ExactCurve;
 use vines::orbit::{
     Bifurcation, Branch, BranchEnd, Condition, ContinuationLimits, DOUBLINGS, Orbit, OrbitCurve, Periodic, PlantMotion,
-    Stability, backbone, continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion,
+    Stability, continue_both_ways, phase_resonant, resonant_motion_under, response, settle, settled_motion,
     stable_resonant,
 };
 use vines::report::responses;
 use vines::scene::{Dimensionless, Scene};
-use vines::survey::{CURVE_POINTS, DETUNINGS, detunings, structure_curves};
+use vines::survey::{DETUNINGS, curves, detunings};
 use vines::table::{Table, lines, note, number};
 use vines::{ArgumentError, cells, numerics::range};
 
@@ -104,8 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         .or_else(|| detunings(&loaded, &scene))
         .unwrap_or(DETUNINGS);
     if arguments.backbone {
-        let of_structure = structure_curves(&loaded, &scene, range, false);
-        let curves = of_structure.unwrap_or_else(|| backbone(&scene, Some(range), CURVE_POINTS));
+        let curves = curves(&loaded, &scene, range, false);
         return shown(&scene, "Exact backbone", &curves, arguments.json, || listed(&curves)).map(Results::from);
     }
     if loaded.structure.is_some() {
@@ -146,7 +145,7 @@ fn of_a_structure(arguments: &Arguments, scene: &Scene, range: [f64; 2]) -> Resu
         let title = "Exact symmetric 1:1 orbits of the structure at resonance, in the numbers of its driven mode; the four largest multipliers";
         return shown(&numbers, title, &orbits, json, || listing(&numbers, &orbits)).map(Results::from);
     }
-    let curves = structure_curves(scene, &numbers, range, true).unwrap_or_default();
+    let curves = curves(scene, &numbers, range, true);
     let title =
         "Exact frequency response of the structure, symmetric 1:1 motions only, in the numbers of its driven mode";
     let text = shown(&numbers, title, &curves, json, || listed(&curves))?;

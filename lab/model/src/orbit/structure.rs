@@ -278,7 +278,7 @@ impl StructureOrbits {
     }
 
     /// The orbits of the study's oscillator, dimensionless.
-    pub(super) fn of(scene: &Dimensionless) -> Self {
+    pub fn of(scene: &Dimensionless) -> Self {
         let Definition { reference, sensor, phase, .. } = scene.definition;
         Self {
             excitation: Excitation::Base,

@@ -65,13 +65,6 @@ pub fn stable_backbone(scene: &Dimensionless, sigma: [f64; 2], points: usize) ->
     stretches.map(|orbits| told(scene, orbits)).collect()
 }
 
-/// The orbit at phase resonance whose response has the amplitude `c` over b, near a detuning and a speed of the particle over `b omega0`.
-pub fn with_amplitude(scene: &Dimensionless, c: f64, [sigma, speed]: [f64; 2]) -> Option<Orbit> {
-    let near = [1.0 + scene.epsilon * sigma, speed];
-    let found = StructureOrbits::of(scene).at_response(c, near)?;
-    Some(found.in_numbers(&bare(scene), 1.0, 1.0))
-}
-
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
 pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
     let (omega, drive) = (1.0 + scene.epsilon * sigma, scene.epsilon * scene.g);
