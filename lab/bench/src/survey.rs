@@ -201,7 +201,7 @@ pub fn stable_backbone(scene: &Scene, numbers: &Dimensionless) -> Vec<Orbit> {
 }
 
 /// Curves of the exact symmetric 1:1 orbits of a scene at these detunings: at phase resonance, or the frequency response under the scene's drive.
-pub fn curves(scene: &Scene, numbers: &Dimensionless, sigma: [f64; 2], is_response: bool) -> Vec<OrbitCurve> {
+pub fn orbit_curves(scene: &Scene, numbers: &Dimensionless, sigma: [f64; 2], is_response: bool) -> Vec<OrbitCurve> {
     let ExactOrbits { orbits, numbers, drive, per_unit } = ExactOrbits::of(scene, numbers);
     let range = StructureRange::at_any_speed(&numbers, sigma, CURVE_POINTS);
     let branches = match is_response {

@@ -34,8 +34,7 @@ pub use structure::{
     StructureRange, StructureStart,
 };
 pub use study::{
-    at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_backbone, stable_resonant,
-    symmetric_orbits,
+    at_amplitude, backbone, backbone_at_speed, exact_backbone, phase_resonant, stable_resonant, symmetric_orbits,
 };
 pub use symmetric::Particle;
 

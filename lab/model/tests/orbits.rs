@@ -6,8 +6,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use vines_model::{
     Definition, Dimensionless,
     orbit::{
-        Bifurcation, Branch, BranchBifurcation, Condition, ContinuationLimits, Orbit, backbone, backbone_at_speed,
-        continue_both_ways, exact_backbone, phase_resonant, response, settle, stable_backbone,
+        Bifurcation, Branch, BranchBifurcation, Condition, ContinuationLimits, Orbit, StructureBranch, StructureOrbits,
+        StructureRange, backbone, backbone_at_speed, continue_both_ways, exact_backbone, phase_resonant, response,
+        settle,
     },
     theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
 };
@@ -203,8 +204,10 @@ fn a_conservative_mode_is_neutral_where_no_multiplier_is_off_the_unit_circle_and
 #[test]
 fn the_drives_of_stable_orbits_end_where_the_backbone_loses_its_stability() {
     let scene = Dimensionless::new(0.032 / 3.807, 1.43, 0.65, 1.1);
-    let stretches = stable_backbone(&scene, [-6.0, 6.0], 400);
-    let largest = stretches.iter().flatten().map(|orbit| orbit.g).fold(0.0, f64::max);
+    let branches = StructureOrbits::of(&scene).backbone(&StructureRange::at_any_speed(&scene, [-6.0, 6.0], 400));
+    let stable = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
+    let drives = stable.flatten().map(|orbit| scene.excitation(orbit.reference));
+    let largest = drives.fold(0.0, f64::max);
     let broken = backbone(&scene, Some([-6.0, 6.0]), 400)
         .into_iter()
         .flat_map(|curve| curve.special)

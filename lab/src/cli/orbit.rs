@@ -15,7 +15,7 @@ use vines::orbit::{
 };
 use vines::report::responses;
 use vines::scene::{Dimensionless, Scene};
-use vines::survey::{DETUNINGS, curves, detunings};
+use vines::survey::{DETUNINGS, detunings, orbit_curves};
 use vines::table::{Table, lines, note, number};
 use vines::{ArgumentError, cells, numerics::range};
 
@@ -104,7 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Results, Failure> {
         .or_else(|| detunings(&loaded, &scene))
         .unwrap_or(DETUNINGS);
     if arguments.backbone {
-        let curves = curves(&loaded, &scene, range, false);
+        let curves = orbit_curves(&loaded, &scene, range, false);
         return shown(&scene, "Exact backbone", &curves, arguments.json, || listed(&curves)).map(Results::from);
     }
     if loaded.structure.is_some() {
@@ -145,7 +145,7 @@ fn of_a_structure(arguments: &Arguments, scene: &Scene, range: [f64; 2]) -> Resu
         let title = "Exact symmetric 1:1 orbits of the structure at resonance, in the numbers of its driven mode; the four largest multipliers";
         return shown(&numbers, title, &orbits, json, || listing(&numbers, &orbits)).map(Results::from);
     }
-    let curves = curves(scene, &numbers, range, true);
+    let curves = orbit_curves(scene, &numbers, range, true);
     let title =
         "Exact frequency response of the structure, symmetric 1:1 motions only, in the numbers of its driven mode";
     let text = shown(&numbers, title, &curves, json, || listed(&curves))?;

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Complex;
 
 use super::Orbit;
-use super::structure::{OrbitCurve, SEARCHED, StructureBranch, StructureOrbit, StructureOrbits, StructureRange};
+use super::structure::{OrbitCurve, SEARCHED, StructureOrbit, StructureOrbits, StructureRange};
 use crate::Dimensionless;
 use crate::numerics::secant;
 use crate::theory::{BranchSide, Manifold, SlowFlow};
@@ -54,15 +54,6 @@ pub fn backbone(scene: &Dimensionless, sigma: Option<[f64; 2]>, points: usize) -
         .iter()
         .map(|branch| branch.in_numbers(&bare(scene), 1.0, 1.0))
         .collect()
-}
-
-/// The stable stretches of the exact backbone over the detunings `sigma`, curves of about `points` orbits, each with the orbits where it begins and
-/// ends.
-pub fn stable_backbone(scene: &Dimensionless, sigma: [f64; 2], points: usize) -> Vec<Vec<Orbit>> {
-    let range = StructureRange::at_any_speed(&bare(scene), sigma, points);
-    let branches = StructureOrbits::of(scene).backbone(&range);
-    let stretches = branches.iter().flat_map(StructureBranch::stable_to_their_ends);
-    stretches.map(|orbits| told(scene, orbits)).collect()
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
