@@ -143,10 +143,7 @@ fn now(structure: &Structure, plant: &lovines::Plant<lovines::Structure>) -> [f6
 /// Largest voltage, current, stroke and force of the exact orbits at phase resonance at a frequency, over omega0.
 fn needed(scene: &Scene, omega: f64) -> Result<[f64; 4], Failure> {
     let structure = scene.structure.as_ref().ok_or("no structure")?;
-    let (orbits, omega0) = (
-        scene.structure_orbits().ok_or("no orbits")?,
-        scene.dimensionless().omega0,
-    );
+    let (orbits, omega0) = (scene.orbits_of(structure), scene.dimensionless().omega0);
     let mut largest = [0.0_f64; 4];
     for orbit in orbits.at_phase_resonance(omega * omega0) {
         let mut plant = lovines::Plant::with_host(structure.host.clone(), scene.plant, &StructureState::default())?;

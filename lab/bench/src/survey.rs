@@ -52,7 +52,8 @@ impl Survey {
     /// The survey of a scene's structure; `None` without one. `progress` is called for every orbit of the backbone that is tried, about
     /// [`Self::ORBITS`] times.
     pub fn of(scene: &Scene, progress: &dyn Fn()) -> Option<Self> {
-        let (structure, orbits) = (scene.structure.as_ref()?, scene.structure_orbits()?);
+        let structure = scene.structure.as_ref()?;
+        let orbits = scene.orbits_of(structure);
         let driven = section_of(structure);
         let facts = orbits.facts(driven, scene.frequencies(), CURVE_POINTS, progress)?;
         let [low, high] = scene.frequencies();
@@ -61,7 +62,7 @@ impl Survey {
             behind_shaker: behind_shaker(scene, &facts.all).unwrap_or_default(),
             facts,
             driven,
-            orbits: orbits.resonant(scene.structure_drive()?, [low.min(least), high.max(most)]),
+            orbits: orbits.resonant(scene.drive(), [low.min(least), high.max(most)]),
         })
     }
 
@@ -125,14 +126,14 @@ pub(crate) struct ExactOrbits {
 impl ExactOrbits {
     /// Those of the oscillator or the structure of a scene.
     pub(crate) fn of(scene: &Scene, numbers: &Dimensionless) -> Self {
-        let Some((structure, drive)) = scene.structure.as_ref().zip(scene.structure_drive()) else {
+        let Some(structure) = &scene.structure else {
             return Self::of_oscillator(numbers);
         };
         let units = structure.units();
         Self {
             orbits: scene.orbits_of(structure),
             numbers: *numbers,
-            drive,
+            drive: scene.drive(),
             per_unit: [units.reference.in_metres(1.0), units.response.of_metres(1.0)],
         }
     }
@@ -214,8 +215,8 @@ pub fn orbit_curves(scene: &Scene, numbers: &Dimensionless, sigma: [f64; 2], is_
 
 /// Detunings of a structure's backbone and of the frequencies that the controller may set.
 pub fn detunings(scene: &Scene, numbers: &Dimensionless) -> Option<[f64; 2]> {
-    let orbits = scene.structure_orbits()?;
-    let range = orbits.range(section_of(scene.structure.as_ref()?), CURVE_POINTS)?;
+    let structure = scene.structure.as_ref()?;
+    let range = scene.orbits_of(structure).range(section_of(structure), CURVE_POINTS)?;
     Some(range.with(scene.frequencies()).omega.map(|omega| numbers.sigma(omega)))
 }
 

@@ -87,7 +87,7 @@ fn described(scene: &Scene, structure: &Structure, survey: &Survey) -> String {
     };
     text += &format!(
         "\nExact symmetric 1:1 orbits at phase resonance under {:.4e} {unit}\n",
-        scene.structure_drive().unwrap_or(0.0)
+        scene.drive()
     );
     let rows = survey.orbits.iter().map(|orbit| row(orbit, b));
     let orbits = Table::new(&format!(

@@ -183,7 +183,7 @@ fn edges_of_a_force_that_alias_are_smaller_than_the_precision_by_default() {
     let samples = scene.controller.samples_per_period;
     let structure = scene.structure.as_ref().unwrap();
     let rows = &structure.shaker.as_ref().unwrap().rows;
-    let orbits = scene.structure_orbits().unwrap();
+    let orbits = scene.orbits_of(scene.structure.as_ref().unwrap());
     let mut found = orbits.at_phase_resonance(0.99 * TAU).into_iter();
     let orbit = found.find(|orbit| orbit.stability.stable).unwrap();
     let (mut plant, drive) = on_orbit(&scene, &orbit);
@@ -259,9 +259,9 @@ fn a_compensated_force_drives_the_structure_alone() {
 fn exact_orbits_with_a_shaker_are_motions_of_the_plant() {
     for n in 0..PRESETS.len() {
         let scene = preset(n, "").unwrap();
-        let orbits = scene.structure_orbits().unwrap();
+        let orbits = scene.orbits_of(scene.structure.as_ref().unwrap());
         let range = [0.97, 1.0].map(|share| share * scene.dimensionless().omega0);
-        let found = orbits.resonant(scene.structure_drive().unwrap(), range);
+        let found = orbits.resonant(scene.drive(), range);
         assert!(!found.is_empty(), "preset {n}");
         for orbit in found {
             let (mut plant, drive) = on_orbit(&scene, &orbit);

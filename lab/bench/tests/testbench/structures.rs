@@ -429,7 +429,7 @@ fn stable_orbits_of_a_structure_lie_on_its_exact_backbone_whatever_the_polygon_b
         let (numbers, structure) = (scene.dimensionless(), scene.structure.as_ref().unwrap());
         let Units { reference, response, .. } = structure.units();
         let [per_drive, per_response] = [reference.in_metres(1.0), response.of_metres(1.0)];
-        let orbits = scene.structure_orbits().unwrap();
+        let orbits = scene.orbits_of(scene.structure.as_ref().unwrap());
         // Between the corners of the polygon, which is off by up to 2e-4, and at them.
         let between =
             (0..60).flat_map(|n| orbits.at_phase_resonance(structure.mode().omega * (0.98 + 0.0007 * f64::from(n))));

@@ -63,11 +63,7 @@ impl Scene {
     pub fn noise(&self) -> [f64; 2] {
         let (chain, d) = (&self.chain, self.dimensionless());
         let ratio = chain.snr.map_or(0.0, |snr| FRAC_1_SQRT_2 * 10_f64.powf(-snr / 20.0));
-        let units = self.units();
-        let levels = [
-            units.response.of_metres(WORKING_LEVEL * d.b),
-            units.reference.of_metres(self.amplitude),
-        ];
+        let levels = [self.units().response.of_metres(WORKING_LEVEL * d.b), self.drive()];
         let per_reading = match self.resonance.reference {
             Reference::Force if self.structure.is_none() => {
                 let static_force = self.plant.stiffness * Reference::Force.per_base(d.epsilon * d.lambda);

@@ -5,12 +5,7 @@ use vines_model::orbit::{Particle, StructureOrbits};
 use super::{Scene, Structure};
 
 impl Scene {
-    /// The exact orbits of the scene's structure; `None` without one. The response is the displacement at the sensor.
-    pub fn structure_orbits(&self) -> Option<StructureOrbits> {
-        self.structure.as_ref().map(|structure| self.orbits_of(structure))
-    }
-
-    /// The exact orbits of a structure with the particle of this scene.
+    /// The exact orbits of a structure with the particle of this scene. The response is the displacement at the sensor.
     pub fn orbits_of(&self, structure: &Structure) -> StructureOrbits {
         let particle = Particle {
             mass: self.plant.particle_mass,
@@ -26,11 +21,9 @@ impl Scene {
             .with_target(self.definition().phase)
     }
 
-    /// Amplitude of the drive of the scene's structure, or of its reference behind a shaker: m for a base, N for a force.
-    pub fn structure_drive(&self) -> Option<f64> {
-        self.structure
-            .as_ref()
-            .map(|structure| structure.units().reference.of_metres(self.amplitude))
+    /// Amplitude of the drive, or of the reference behind a shaker: m for a base, N for a force.
+    pub fn drive(&self) -> f64 {
+        self.units().reference.of_metres(self.amplitude)
     }
 
     /// The frequencies that the controller may set, rad/s.
