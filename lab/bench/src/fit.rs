@@ -41,6 +41,23 @@ impl ResonancePoint {
     }
 }
 
+/// A value and its standard uncertainty with two digits of it.
+pub fn with_decimals((value, uncertainty): (f64, f64)) -> String {
+    if !uncertainty.is_finite() {
+        return "not determined".into();
+    }
+    let decimals = decimals(uncertainty);
+    format!("{value:.decimals$} ± {uncertainty:.decimals$}")
+}
+
+/// Natural frequency and damping ratio in words.
+pub fn linear_in_words(linear: &MeasuredLinear) -> String {
+    let [f0, zeta] = linear
+        .estimates()
+        .map(|one| with_decimals((one.value, one.uncertainty)));
+    format!("f0 = {f0} Hz, zeta = {zeta}")
+}
+
 /// Decimals for two digits of a standard uncertainty.
 pub fn decimals(uncertainty: f64) -> usize {
     if uncertainty > 0.0 && uncertainty.is_finite() {

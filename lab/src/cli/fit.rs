@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use vines::fit::{
     CALIBRATION, FitReport, FittedParameter, Found, Hypothesis, HypothesisReport, Known, LinearVerdict, Measurements,
-    Quantity, Selection, Stretch, decay_in_words, decimals, find, requires_sensor,
+    Quantity, Selection, Stretch, decay_in_words, decimals, find, linear_in_words, requires_sensor, with_decimals,
 };
 use vines::numerics::Estimate;
 use vines::report::fitted;
@@ -136,10 +136,6 @@ struct Output<'a> {
 
 /// What the points say of a linear response.
 fn of_linear(verdict: &LinearVerdict) -> String {
-    let [f0, zeta] = verdict
-        .linear
-        .estimates()
-        .map(|one| with_decimals((one.value, one.uncertainty)));
     let rises = ["with the particle carried along", "with a free particle"]
         .into_iter()
         .zip(verdict.rises)
@@ -153,16 +149,10 @@ fn of_linear(verdict: &LinearVerdict) -> String {
             "the points contradict them, and both are left out: a cavity that is not ideal or a particle that slides may be the reason"
         }
     };
-    format!("linear response: f0 = {f0} Hz, zeta = {zeta}: {rises}: {result}")
-}
-
-/// A value and its standard uncertainty with two digits of it.
-fn with_decimals((value, uncertainty): (f64, f64)) -> String {
-    if !uncertainty.is_finite() {
-        return "not determined".into();
-    }
-    let decimals = decimals(uncertainty);
-    format!("{value:.decimals$} ± {uncertainty:.decimals$}")
+    format!(
+        "linear response: {}: {rises}: {result}",
+        linear_in_words(&verdict.linear)
+    )
 }
 
 /// What the files contain.

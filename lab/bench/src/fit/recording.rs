@@ -11,13 +11,13 @@ use num_complex::Complex64;
 use serde::Serialize;
 use vines_estimate::Oscillations;
 use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Unidentified, identify};
-use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean, range};
+use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, range};
 use vines_model::{ArgumentError, Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
 use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, ParticleState};
 use vines_scene::scene::{Scene, Units};
 
-use super::decimals;
+use super::linear_in_words;
 use crate::identification::Line;
 
 /// Two channels of a measurement, sampled at equal distances.
@@ -47,11 +47,7 @@ pub struct Recording {
 
 /// What a linear decay says, in words.
 pub fn decay_in_words(decay: &MeasuredLinear) -> String {
-    let [f0, zeta] = decay.estimates().map(|Estimate { value, uncertainty }| {
-        let decimals = decimals(uncertainty);
-        format!("{value:.decimals$} ± {uncertainty:.decimals$}")
-    });
-    format!("no impacts: this is a linear decay, f0 = {f0} Hz, zeta = {zeta}")
+    format!("no impacts: this is a linear decay, {}", linear_in_words(decay))
 }
 
 /// Periods within which a constant hardly drifts, and fewest of a recording: the drift is removed over as many.

@@ -55,15 +55,9 @@ impl InputChannel {
 impl Chain {
     /// The rig behind its chain, or the rig itself where the chain is off.
     pub fn around(rig: Box<dyn Rig>, scene: &Scene) -> Box<dyn Rig> {
-        if scene.chain.is_on() {
-            Box::new(Self::new(rig, scene))
-        } else {
-            rig
+        if !scene.chain.is_on() {
+            return rig;
         }
-    }
-
-    /// The chain of a scene around `rig`.
-    pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
         let (settings, d, noise) = (&scene.chain, scene.dimensionless(), scene.noise());
         let channel = |range: f64, noise: f64| InputChannel {
             noise,
@@ -77,7 +71,7 @@ impl Chain {
             .resonance
             .measurands()
             .map(|measurand| d.omega0.powi(measurand.order()));
-        Self {
+        Box::new(Self {
             rig,
             response: channel(
                 response.of_metres(settings.response_range * d.b) * per_displacement[0],
@@ -95,7 +89,7 @@ impl Chain {
             late: 0.0,
             under_way: vec![Sensors::default(); settings.delay as usize].into(),
             elapsed: 0.0,
-        }
+        })
     }
 }
 

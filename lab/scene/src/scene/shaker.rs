@@ -318,8 +318,8 @@ pub(super) struct ShakerSection {
     force_factor: f64,
     #[serde(default)]
     amplifier: Amplifier,
-    #[serde(default = "one")]
-    gain: f64,
+    /// 1 if it is left out.
+    gain: Option<f64>,
     /// Hz
     cut_off: Option<f64>,
     voltage_max: Option<f64>,
@@ -328,10 +328,6 @@ pub(super) struct ShakerSection {
     force_max: Option<f64>,
     #[serde(default)]
     release: Release,
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 impl ShakerSection {
@@ -372,7 +368,7 @@ impl ShakerSection {
             inductance: self.inductance,
             force_factor: self.force_factor,
             amplifier: self.amplifier,
-            gain: self.gain,
+            gain: self.gain.unwrap_or(1.0),
             cut_off: self.cut_off.map(|hertz| TAU * hertz),
         };
         let limits = Limits {
