@@ -169,8 +169,6 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
 
 /// Orbits of the curve of one oscillator: as a polygon it is off by less than 1e-5.
 const OSCILLATOR_ORBITS: usize = 3000;
-/// Largest particle speed of the curve: beyond symmetry breaking.
-const SPEED_MAX: f64 = 1.35;
 
 /// C, sigma, G and speed of the particle of an exact orbit.
 type Place = [f64; 4];
@@ -210,7 +208,7 @@ fn place(orbit: &Orbit) -> Place {
 
 /// The places of a curve from its smallest response towards faster particles.
 fn right_of_fold(curve: &[Orbit]) -> Vec<Place> {
-    let mut orbits: Vec<&Orbit> = curve.iter().filter(|orbit| orbit.b < SPEED_MAX).collect();
+    let mut orbits: Vec<&Orbit> = curve.iter().collect();
     orbits.sort_by(|one, other| one.b.total_cmp(&other.b));
     let fold = (0..orbits.len()).min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c));
     let rising = orbits.iter().skip(fold.unwrap_or(0));
