@@ -4,11 +4,11 @@
 mod channels;
 mod recording;
 
+use std::error::Error;
 use std::f64::consts::TAU;
 
 use lovines::Cavity;
 use serde::Serialize;
-use thiserror::Error;
 use vines_identify::{ChannelTest, Data, EXCLUDED, Fit, Hypotheses, probability};
 pub use vines_identify::{FitError, Hypothesis, Known, MeasuredPoint, Quantity};
 use vines_model::numerics::{Estimate, SIGNIFICANT};
@@ -109,15 +109,6 @@ impl Default for Measurements {
     }
 }
 
-/// Why nothing was found.
-#[derive(Debug, Error)]
-#[error(transparent)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum NotFound {
-    Fit(#[from] FitError),
-    Recording(#[from] ArgumentError),
-}
-
 /// The rig that fits what was measured.
 #[derive(Debug, Clone)]
 pub struct Found {
@@ -135,7 +126,11 @@ pub struct Found {
 ///
 /// # Errors
 /// As [`Data::ideal`] and [`Recording::curve`].
-pub fn find(measured: &Measurements, scene: &Scene, progress: impl FnMut(usize)) -> Result<Found, NotFound> {
+pub fn find(
+    measured: &Measurements,
+    scene: &Scene,
+    progress: impl FnMut(usize),
+) -> Result<Found, Box<dyn Error + Send + Sync>> {
     plausible(&measured.points, scene)?;
     let curves: Result<Vec<_>, _> = measured.recordings.iter().map(|one| one.curve(scene)).collect();
     let (curves, stretches): (Vec<_>, Vec<_>) = curves?.into_iter().unzip();
