@@ -50,7 +50,7 @@ fn main() -> Result<(), Failure> {
         .is_some_and(|structure| structure.shaker.is_some());
     let plan = scene.plan_on(scene.knowledge().measured(scene.knowledge().linear));
     let healthy = |tracks| -> Result<[f64; 2], Failure> {
-        let run = run(&mut SensorsOnly::around(Simulated::of(&scene)?), &plan, tracks);
+        let run = run(&mut SensorsOnly(Simulated::of(&scene)?), &plan, tracks);
         Ok(run?)
     };
     let ([settled, released], [locked, tracked]) = (healthy(false)?, healthy(true)?);

@@ -49,7 +49,7 @@ fn drawn(difference: &str, uniform: Uniform) -> (Case, Cavity) {
 fn run((case, cavity): &(Case, Cavity), snr: &str) -> Result<Found, Failure> {
     let (ideal, scene, plan) = client(case, snr)?;
     let (rig, epsilon) = (Parameters { cavity: *cavity, ..ideal }, case.0[0]);
-    let tracked = tracked(&mut SensorsOnly::around(behind_chain(rig, &scene)?), &plan, 20.0)?;
+    let tracked = tracked(&mut SensorsOnly(behind_chain(rig, &scene)?), &plan, 20.0)?;
     // Sigma counts from the natural frequency that the client has measured.
     let own = plan.knowledge.numbers;
     let (mut found, mut settled, mut without) = (Found::default(), 0, 0);

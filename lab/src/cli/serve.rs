@@ -182,7 +182,7 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
             (_, Some(Fault { kind, seconds })) => {
                 Box::new(faulty(&scene, kind, seconds, move |zero| print_reaction(zero, json))?)
             }
-            _ if arguments.sensors_only => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
+            _ if arguments.sensors_only => Box::new(SensorsOnly(Simulated::of(&scene)?)),
             _ => Simulated::without_chain(&scene)?,
         };
         Ok(match &watch {

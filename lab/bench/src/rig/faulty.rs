@@ -162,7 +162,7 @@ pub fn faulty(
         random: ChaCha8Rng::seed_from_u64(1),
         ended: Box::new(ended),
     };
-    Ok(SensorsOnly::around(Chain::around(Box::new(rig), scene)))
+    Ok(SensorsOnly(Chain::around(Box::new(rig), scene)))
 }
 
 impl Faulty {

@@ -179,14 +179,7 @@ impl<R: Rig + ?Sized> Rig for Scaled<'_, R> {
 // A rig that shows its sensors only, as a real one does.
 
 /// A rig without its ground truth.
-pub struct SensorsOnly(Box<dyn Rig>);
-
-impl SensorsOnly {
-    /// Hides the ground truth of a rig.
-    pub fn around(rig: Box<dyn Rig>) -> Self {
-        Self(rig)
-    }
-}
+pub struct SensorsOnly(pub Box<dyn Rig>);
 
 impl RigStage for SensorsOnly {
     fn inner(&mut self) -> &mut dyn Rig {

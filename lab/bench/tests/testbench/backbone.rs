@@ -121,7 +121,7 @@ const FEW: &str = "start.dq2=0 backbone.points=7 backbone.C_from=0.6 backbone.C_
 /// The backbone of a rig by a client whose scene is another one.
 fn compared_from_sensors(scene: &Scene, rig: &Scene, checked: bool) -> Result<TrackedComparison, ExperimentError> {
     let mut plan = scene.plan();
-    let mut rig = SensorsOnly::around(Simulated::of(rig).unwrap());
+    let mut rig = SensorsOnly(Simulated::of(rig).unwrap());
     if checked {
         let linear = check(&mut rig, &plan).unwrap().linear.expect("a linear response");
         plan = scene.plan_on(plan.knowledge.measured(linear.response));
@@ -157,7 +157,7 @@ fn a_curve_that_ends_on_a_rig_without_reported_impacts_is_a_result_though_the_co
             format!("start.dq2=0 plant.epsilon=0.0042 plant.lambda=2.15 plant.r={r} chain.snr={snr} chain.seed=1");
         let scene = dimensionless(&format!("{rig} {levels}"));
         let plan = super::checked(&scene);
-        let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
+        let mut rig = SensorsOnly(Simulated::of(&scene).unwrap());
         let mut controller = BuiltIn::new(&plan.tracking).unwrap();
         let tracked = track(&mut Vec::new(), &mut rig, &mut controller, &plan, |_| {}).unwrap();
         assert!(tracked.ended.is_none(), "{r}, {snr} dB: {:?}", tracked.ended);

@@ -98,7 +98,7 @@ fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference_and_nearer_to_it_a
 #[test]
 fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
     let scene = dimensionless("");
-    let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
+    let mut rig = SensorsOnly(Simulated::of(&scene).unwrap());
     assert_eq!(rig.ground_truth().unwrap(), None);
     let mut controller = BuiltIn::new(&scene.plan().lock).unwrap();
     let mute = identified_by(&mut rig, &mut controller, &scene, &scene.plan()).unwrap();
@@ -120,7 +120,7 @@ fn a_lock_of_the_linear_mode_or_of_an_asymmetric_motion_is_refused() {
     let stated = rest.knowledge();
     let checked = stated.measured(rest.knowledge().linear);
     for (knowledge, expected) in [(stated, Regime::NotEstablished), (checked, Regime::NoImpacts)] {
-        let mut rig = SensorsOnly::around(Simulated::of(&rest).unwrap());
+        let mut rig = SensorsOnly(Simulated::of(&rest).unwrap());
         let found = identified_by(&mut rig, &mut constant_drive(&rest), &rest, &rest.plan_on(knowledge));
         let refusal = found.unwrap_err();
         let is_expected = matches!(refusal, IdentificationError::Regime { regime, .. } if regime == expected);

@@ -345,7 +345,7 @@ const IN_METRES: [&str; 3] = [
 /// The rig of the true scene, and a client's scene that is wrong.
 fn falsified(settings: &[&str], wrong: &[&str]) -> (SensorsOnly, Scene) {
     let truth = paper(&[&IN_METRES[..], settings].concat());
-    let rig = SensorsOnly::around(Simulated::of(&truth).unwrap());
+    let rig = SensorsOnly(Simulated::of(&truth).unwrap());
     // The levels 6 and 3 mm over the half-width that the scene states.
     let levels = match wrong.contains(&"plant.b=0.012") {
         true => ["backbone.C_from=0.5", "backbone.C_to=0.25"],
@@ -549,7 +549,7 @@ fn rig<'a>(scene: &Scene, tones: &'a [(f64, f64)]) -> Altered<'a> {
         time += step;
         Sensors { response, ..sensors }
     });
-    let rig = SensorsOnly::around(Simulated::of(scene).unwrap());
+    let rig = SensorsOnly(Simulated::of(scene).unwrap());
     Altered { rig: Box::new(rig), ..shown }
 }
 

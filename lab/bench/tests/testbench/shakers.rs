@@ -335,7 +335,7 @@ fn a_heavy_table_that_floats_on_a_soft_suspension_is_not_taken_for_a_late_respon
 /// chain.
 fn distance_of_checked_lock(chain: &str) -> [f64; 2] {
     let scene = preset(0, &format!("[start] -> {chain}[start]")).unwrap();
-    let mut rig = SensorsOnly::around(Simulated::of(&scene).unwrap());
+    let mut rig = SensorsOnly(Simulated::of(&scene).unwrap());
     // The check measures what a filter takes of the readings, and the results are corrected by it.
     let linear = check(&mut rig, &scene.plan()).unwrap().linear.unwrap();
     let plan = scene.plan_on(scene.knowledge().measured(linear.response));
@@ -367,13 +367,7 @@ fn a_limit_that_is_reached_ends_the_experiment_with_its_name() {
     let plan = scene.plan();
     let mut controller = BuiltIn::new(&plan.tracking).unwrap();
     let rig = Simulated::of(&scene).unwrap();
-    let error = track(
-        &mut Vec::new(),
-        &mut SensorsOnly::around(rig),
-        &mut controller,
-        &plan,
-        |_| {},
-    );
+    let error = track(&mut Vec::new(), &mut SensorsOnly(rig), &mut controller, &plan, |_| {});
     let is_limit = |error: &ExperimentError| {
         matches!(error, ExperimentError::Rig(RigError::ShakerLimit { name: "force", .. }))
             && error.to_string().contains("shaker.force_max")

@@ -59,11 +59,7 @@ impl Log {
 fn logged<'a>(scene: &Scene, silent: bool, log: &'a RefCell<Log>) -> Altered<'a> {
     let rig = Simulated::of(scene).unwrap();
     Altered {
-        rig: if silent {
-            Box::new(SensorsOnly::around(rig))
-        } else {
-            rig
-        },
+        rig: if silent { Box::new(SensorsOnly(rig)) } else { rig },
         read: Box::new(|sensors| {
             log.borrow_mut().readings.push(sensors);
             Ok(sensors)
