@@ -82,10 +82,8 @@ impl Comparison {
         let omega = TAU * lock.at.f_hz;
         let moved = knowledge.target.base_per_sample(omega, knowledge.sample_time);
         let driven = Dimensionless { g: moved * parameters.g, ..parameters };
-        let mut solutions = resonant(&driven);
-        solutions.retain(|point| point.stable());
-        solutions.sort_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
-        let theory = solutions.first().copied();
+        let solutions = resonant(&driven).into_iter().filter(BackbonePoint::stable);
+        let theory = solutions.min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
         let as_driven = Scene { amplitude: moved * scene.amplitude, ..scene.clone() };
         let orbits = phase_resonant(&as_driven, &driven);
         let at_target = ExactCurve::of_scene(scene, &parameters, [lock.at.sigma, lock.at.c]);

@@ -18,8 +18,9 @@ const FEWEST_IMPACTS: usize = 12;
 pub struct LastImpacts(pub Vec<Impact>);
 
 impl LastImpacts {
-    /// Forgets all impacts but the last forty.
-    pub fn trim(&mut self) {
+    /// Adds an impact, and forgets all but the last forty.
+    pub fn add(&mut self, impact: Impact) {
+        self.0.push(impact);
         let surplus = self.0.len().saturating_sub(IMPACTS_KEPT);
         self.0.drain(..surplus);
     }

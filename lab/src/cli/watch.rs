@@ -259,11 +259,10 @@ impl View {
             return;
         }
         let since = now.time - truth.impact_time;
-        self.impacts.0.push(Impact {
+        self.impacts.add(Impact {
             time: self.phase - now.command.drive.omega * since,
             velocity: truth.impact_velocity,
         });
-        self.impacts.trim();
         let Some(share) = particle_in_response(&self.scene) else {
             return;
         };

@@ -46,14 +46,13 @@ impl Rig for NoisyRig {
         let (impacts, phase) = (&mut self.impacts, self.phase);
         let mut count = |event: Event| {
             if let Event::Impact { t, velocity, .. } = event {
-                impacts.0.push(Impact { time: phase + drive.omega * t, velocity });
+                impacts.add(Impact { time: phase + drive.omega * t, velocity });
             }
         };
         // One instance of the plant's code for all callers: it is most of the module.
         let count: &mut dyn FnMut(Event) = &mut count;
         let harmonic = lovines::Drive::harmonic(drive.amplitude, drive.omega);
         self.plant.advance_with(harmonic, step, count)?;
-        self.impacts.trim();
         self.phase += drive.omega * step;
         Ok(())
     }
