@@ -44,7 +44,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use shaker::ShakerSection;
 use structure::StructureSection;
-use toml::Table;
+use toml::{Table, Value};
 
 use crate::knowledge::{Knowledge, Target, carried_up_to, has_friction};
 use crate::linear::LinearResponse;
@@ -410,13 +410,14 @@ pub fn utf8(bytes: &[u8]) -> Result<&str, String> {
 
 // Options of a scene: a number, or `false` or "none". Zero is a number like every other.
 
+/// Whether a value says that there is no number.
+fn is_none(value: &Value) -> bool {
+    *value == Value::Boolean(false) || value.as_str() == Some("none")
+}
+
 /// Reads an option.
 fn option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<T>, D::Error> {
-    match toml::Value::deserialize(from)? {
-        toml::Value::Boolean(false) => Ok(None),
-        toml::Value::String(word) if word == "none" => Ok(None),
-        value => T::deserialize(value)
-            .map(Some)
-            .map_err(|_| D::Error::custom("expected a number, or false or \"none\"")),
-    }
+    let value = Some(Value::deserialize(from)?).filter(|value| !is_none(value));
+    let number = value.map(T::deserialize).transpose();
+    number.map_err(|_| D::Error::custom("expected a number, or false or \"none\""))
 }

@@ -164,6 +164,21 @@ struct Gathered {
     notes: Vec<String>,
 }
 
+/// The files, each with what is in it.
+fn sources<'a>(
+    files: &'a [PathBuf],
+    read: &dyn Fn(&Path) -> Result<Source, ArgumentError>,
+) -> Result<Vec<(&'a PathBuf, Source)>, Failure> {
+    let source = |(n, path): (usize, &'a PathBuf)| match files[..n].contains(path) {
+        true => Err(Failure::input(format!(
+            "{} is given twice: its data would count twice, and the uncertainties be too small",
+            path.display()
+        ))),
+        false => Ok((path, read(path).map_err(Failure::input)?)),
+    };
+    files.iter().enumerate().map(source).collect()
+}
+
 /// `read` reads the files: the program plain tables and its own files, the Python package others as well.
 fn gathered(
     arguments: &Arguments,
@@ -179,16 +194,7 @@ fn gathered(
         ..Measurements::default()
     };
     let (mut skipped, mut notes) = (0, Vec::new());
-    let mut sources = Vec::new();
-    for (n, path) in arguments.points.iter().enumerate() {
-        if arguments.points[..n].contains(path) {
-            return Err(Failure::input(format!(
-                "{} is given twice: its data would count twice, and the uncertainties be too small",
-                path.display()
-            )));
-        }
-        sources.push((path, read(path).map_err(Failure::input)?));
-    }
+    let sources = sources(&arguments.points, read)?;
     let reading = Reading {
         columns: &arguments.column,
         phase: scene.definition().phase,

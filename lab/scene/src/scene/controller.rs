@@ -17,7 +17,7 @@ use crate::linear::{DRAWING, LinearResponse};
 use crate::units::{Unit, Units};
 
 use super::checks::{Range, Row};
-use super::{Measurand, Scene, SceneError, given};
+use super::{Measurand, Scene, SceneError, given, is_none};
 
 settings! {
     /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -422,8 +422,7 @@ fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), Argumen
     let setting = match (parameter.get(&config), value) {
         (Setting::Real(_), Value::Float(number)) => Setting::Real(*number),
         (Setting::Real(_), Value::Integer(number)) => Setting::Real(*number as f64),
-        (Setting::Real(_), Value::String(word)) if word == "none" => Setting::Real(NONE),
-        (Setting::Real(_), Value::Boolean(false)) => Setting::Real(NONE),
+        (Setting::Real(_), value) if is_none(value) => Setting::Real(NONE),
         (Setting::Integer(_), Value::Integer(number)) => Setting::Integer(i32::try_from(*number).unwrap_or(i32::MAX)),
         (Setting::Boolean(_), Value::Boolean(value)) => Setting::Boolean(*value),
         _ => {
