@@ -279,11 +279,7 @@ fn masses(system: &System, start: State) -> Result<Masses, InvalidValue> {
 
 /// Positions (m) and velocities (m/s) of both masses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(deny_unknown_fields, default)
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
     /// Displacement of the primary mass.
     pub q1: f64,

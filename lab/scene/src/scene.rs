@@ -39,7 +39,7 @@ use std::path::Path;
 
 use error::plain;
 use lovines::{Cavity, Restitution, State};
-use plant::{ExcitationSection, PlantSection, given};
+use plant::{ExcitationSection, PlantSection, StartSection, given};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use shaker::ShakerSection;
@@ -286,7 +286,7 @@ struct Sections {
     plant: PlantSection,
     structure: Option<StructureSection>,
     shaker: Option<ShakerSection>,
-    start: State,
+    start: StartSection,
     excitation: ExcitationSection,
     controller: ControllerSettings,
     phase_lock: PhaseLock,
@@ -316,10 +316,9 @@ impl Sections {
         }
         let plant = self.plant.resolve(origin)?;
         let is_given = |section: &str, key: &str| table.get(section).is_some_and(|keys| keys.get(key).is_some());
-        plant::check_start(origin, self.start, &plant, structure.is_some())?;
         let numbers = Dimensionless::of(&plant, 0.0);
         let mut scene = Scene {
-            start: self.start,
+            start: self.start.resolve(origin, &plant, structure.as_ref())?,
             amplitude: self.excitation.in_metres(origin, &numbers, structure.as_ref())?,
             plant,
             states_sensor: structure.is_some() || is_given("resonance", "sensor"),

@@ -180,19 +180,33 @@ impl PlantSection {
     }
 }
 
-/// Refuses a `[start]` that the plant does not take; of a structure, only the particle moves.
-pub(super) fn check_start(
-    origin: &str,
-    start: State,
-    plant: &Parameters,
-    is_structure: bool,
-) -> Result<(), SceneError> {
-    if is_structure && (start.q1 != 0.0 || start.dq1 != 0.0) {
-        let message = "[start] has q1 or dq1: a structure starts at rest; give q2 and dq2 of the particle only";
-        return Err(SceneError::text(origin, message));
+/// The `[start]` section; what is left out is zero.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct StartSection {
+    q1: f64,
+    dq1: f64,
+    q2: f64,
+    dq2: f64,
+}
+
+impl StartSection {
+    /// The state, once a plant takes it; of a structure, only the particle moves.
+    pub(super) fn resolve(
+        &self,
+        origin: &str,
+        plant: &Parameters,
+        structure: Option<&Structure>,
+    ) -> Result<State, SceneError> {
+        let Self { q1, dq1, q2, dq2 } = *self;
+        if structure.is_some() && (q1 != 0.0 || dq1 != 0.0) {
+            let message = "[start] has q1 or dq1: a structure starts at rest; give q2 and dq2 of the particle only";
+            return Err(SceneError::text(origin, message));
+        }
+        let start = State { q1, dq1, q2, dq2 };
+        lovines::Plant::new(*plant, start)?;
+        Ok(start)
     }
-    lovines::Plant::new(*plant, start)?;
-    Ok(())
 }
 
 /// The rows of the plant's table with their numbers; of the cavity those that are not ideal.
