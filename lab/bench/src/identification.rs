@@ -23,9 +23,9 @@ pub(crate) use asked::{SAME, departure, is_another};
 pub(crate) use cycle::Cycle;
 pub(crate) use decay::{DECAY_TERMS, PER_PERIOD, base_at_rest, harmonic};
 pub use decay::{DECAY_WINDOW, DecayEnd, DecayPoints, FreeDecayPoint, decay_points};
-pub(crate) use level::{Criterion, LevelEstimate, Unsteady};
+pub(crate) use level::{Criterion, Unsteady};
 pub(crate) use level::{LONGEST_SETTLING, is_off_target};
-pub(crate) use resonance_fit::ResonanceFit;
+pub(crate) use resonance_fit::LevelEstimate;
 pub use response::Tone;
 pub(crate) use response::{
     Line, classify, drive_harmonics, foreign_tone, regime_by_response, regime_of_leg, subharmonic, without_tones,
@@ -343,7 +343,7 @@ fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
     let (response, drive) = (near(Cycle::amplitude), near(|cycle| cycle.base.norm()));
     let is_near = |cycle: &&Cycle| response(cycle) && drive(cycle) && cycle.phase_error.abs() <= PHASE_RANGE;
     let near = cycles.iter().rev().take_while(is_near).count();
-    let fewest = held.len().max(2 * ResonanceFit::FEWEST);
+    let fewest = held.len().max(2 * LevelEstimate::FEWEST);
     &cycles[cycles.len() - near.max(fewest).min(cycles.len())..]
 }
 

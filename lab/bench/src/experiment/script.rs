@@ -18,7 +18,7 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, lagrange, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, Stage};
 use crate::identification::{
-    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, ResonanceFit, SAME, Unsteady, is_another, is_wanted,
+    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, SAME, Unsteady, is_another, is_wanted,
     regime_by_response, regime_of_leg, subharmonic, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
@@ -539,7 +539,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// Measures over `periods`, without foreign tones, which disturb so few periods.
     fn measure(&mut self, periods: usize, is_at_rest: bool) -> Result<Leg, ExperimentError> {
         let (begin, turns) = (self.run.samples.len(), self.run.periods);
-        for _ in 0..periods.max(ResonanceFit::FEWEST) {
+        for _ in 0..periods.max(LevelEstimate::FEWEST) {
             self.run.period(self.stage)?;
         }
         let raw = &self.run.samples[begin..];
@@ -547,10 +547,10 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let cleaned = without_tones(raw, self.knowledge, omega);
         let samples = cleaned.as_deref().unwrap_or(raw);
         let cycles = Cycle::all(samples, turns, self.knowledge);
-        let Some(fit) = ResonanceFit::of(&cycles, self.knowledge, None, false) else {
+        let Some(fit) = LevelEstimate::of(&cycles, self.knowledge, None, false) else {
             return self.measure(periods, is_at_rest);
         };
-        let [drive, omega] = fit.at_mean();
+        let [drive, omega] = fit.at;
         let leg = Leg {
             response: fit.response.value,
             last: cycles[cycles.len() - 1].amplitude(),

@@ -2,7 +2,7 @@
 
 use vines_model::numerics::{Estimate, SIGNIFICANT, mean, range};
 
-use super::{Cycle, LevelEstimate, ResonanceFit};
+use super::{Cycle, LevelEstimate};
 use crate::record::Sample;
 use vines_scene::plan::Plan;
 use vines_scene::scene::Dimensionless;
@@ -20,7 +20,7 @@ pub(crate) fn is_another(difference: f64, u: f64, requested: f64) -> bool {
 pub(crate) fn departure(samples: &[Sample], plan: &Plan) -> Option<String> {
     let knowledge = &plan.knowledge;
     let cycles = Cycle::all(samples, 0.0, knowledge);
-    if cycles.len() < ResonanceFit::FEWEST {
+    if cycles.len() < LevelEstimate::FEWEST {
         return None;
     }
     let [noise, base_noise] = Cycle::noise_of(&cycles, false);

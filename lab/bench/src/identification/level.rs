@@ -1,4 +1,4 @@
-//! When a level is settled: drive and frequency of phase resonance ([`ResonanceFit`]) are known as precisely as the scene asks, from periods whose
+//! When a level is settled: drive and frequency of phase resonance ([`LevelEstimate`]) are known as precisely as the scene asks, from periods whose
 //! innovations are white noise. Noise lengthens the window, and so does a transient that the model does not describe.
 
 use std::cmp::Ordering;
@@ -6,7 +6,7 @@ use std::fmt::{self, Display, Formatter};
 
 use vines_model::numerics::{Estimate, RANDOM};
 
-use super::{Cycle, ResonanceFit};
+use super::{Cycle, LevelEstimate};
 use vines_scene::knowledge::Knowledge;
 
 /// What is asked of a level.
@@ -20,21 +20,6 @@ pub struct Criterion {
     pub largest: f64,
     /// The last two points before, the nearest last: amplitude of the response, m, drive, m, and frequency, rad/s.
     pub before: [Option<[f64; 3]>; 2],
-}
-
-/// A point of the backbone from a window of periods.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LevelEstimate {
-    /// Number of periods.
-    pub periods: usize,
-    /// Mean amplitude of the response, m.
-    pub response: Estimate,
-    /// Mean phase error, rad.
-    pub phase_error: Estimate,
-    /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
-    pub at: [Estimate; 2],
-    /// What in the window is not noise; `None` if the fit describes it.
-    pub unsteady: Option<Unsteady>,
 }
 
 /// What is not noise in a window of periods.
@@ -86,7 +71,7 @@ impl Criterion {
     pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
-        let considered = counts.into_iter().filter(|count| *count >= 2 * ResonanceFit::FEWEST);
+        let considered = counts.into_iter().filter(|count| *count >= 2 * LevelEstimate::FEWEST);
         let rank = |estimate: &LevelEstimate| (estimate.unsteady.is_some(), self.size(estimate));
         considered
             .filter_map(|count| self.of(&cycles[n - count..]))
@@ -125,34 +110,13 @@ impl Criterion {
 
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
-        let fit = |slopes| ResonanceFit::of(cycles, &self.knowledge, slopes, true);
-        let mut whole = fit(None)?;
-        let [base, omega] = whole.at_mean().map(|value| value.value);
-        if let Some(known) = self.slopes([whole.response.value, base, omega]) {
-            whole = fit(Some(known))?;
+        let fit = |slopes| LevelEstimate::of(cycles, &self.knowledge, slopes, true);
+        let mut level = fit(None)?;
+        let [base, omega] = level.at.map(|value| value.value);
+        if let Some(known) = self.slopes([level.response.value, base, omega]) {
+            level = fit(Some(known))?;
         }
-        let at = whole.at_mean();
-        let is_finite = at.iter().all(|part| (part.value + part.uncertainty).is_finite());
-        is_finite.then_some(LevelEstimate {
-            periods: cycles.len(),
-            response: whole.response,
-            phase_error: whole.phase_error,
-            at,
-            unsteady: whole.unsteady(),
-        })
-    }
-}
-
-impl LevelEstimate {
-    /// Means over the periods, of a motion that no balance describes.
-    pub fn means(cycles: &[Cycle]) -> Self {
-        let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
-        Self {
-            periods: cycles.len(),
-            response: mean(&Cycle::amplitude),
-            phase_error: mean(&|cycle| cycle.phase_error),
-            at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
-            unsteady: Some(Unsteady::Scatter(None)),
-        }
+        let is_finite = level.at.iter().all(|part| (part.value + part.uncertainty).is_finite());
+        is_finite.then_some(level)
     }
 }

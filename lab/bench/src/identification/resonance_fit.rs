@@ -23,27 +23,25 @@ use super::{Cycle, SMALLEST_DISTURBANCE, Unsteady};
 use vines_scene::knowledge::Knowledge;
 use vines_scene::scene::{Definition, Reference, Sensor};
 
-/// Drive and frequency of phase resonance, from some periods.
-#[derive(Debug, Clone)]
-pub struct ResonanceFit {
+/// A point of the backbone from a window of periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelEstimate {
+    /// Number of periods.
+    pub periods: usize,
     /// Mean amplitude of the response, m.
     pub response: Estimate,
     /// Mean phase error, rad.
     pub phase_error: Estimate,
-    level: Level,
-    /// g, 1/s, and its relative uncertainty.
-    gain: f64,
-    u_gain: f64,
-    /// Mean frequency of the drive, rad/s.
-    omega: f64,
-    /// Phase target beyond phase resonance, rad.
-    target: f64,
+    /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
+    pub at: [Estimate; 2],
+    /// What in the window is not noise; `None` if the fit describes it.
+    pub unsteady: Option<Unsteady>,
 }
 
 /// Largest lag of the impacts behind a change of the amplitude, periods (studies/tracking.rs).
 const LAG: f64 = 1.6;
 
-impl ResonanceFit {
+impl LevelEstimate {
     /// Fewest periods: one more than a steady motion has unknowns.
     pub(crate) const FEWEST: usize = 4;
 
@@ -106,45 +104,53 @@ impl ResonanceFit {
         })?;
         let phase_noise = (noise / response).hypot(base_noise / base);
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
+        let response = of(response * (level.amplitude - mean_before).exp(), noise);
+        let unsteady = match () {
+            () if !level.is_noise() => Some(Unsteady::Scatter(Some(level.scatter()))),
+            () if !level.is_white() => Some(Unsteady::Drift(level.correlation())),
+            () => None,
+        };
         Some(Self {
-            response: of(response * (level.amplitude - mean_before).exp(), noise),
+            periods: cycles.len(),
+            response,
             phase_error: of(mean(cycles.iter().map(|cycle| cycle.phase_error)), phase_noise),
-            level,
-            gain,
-            u_gain,
-            omega,
-            target,
+            at: resonance(&level, response.value, [gain, u_gain], [omega, target]),
+            unsteady,
         })
     }
 
-    /// Drive, m, and frequency, rad/s, at the mean amplitude.
-    pub fn at_mean(&self) -> [Estimate; 2] {
-        let (force, tangent) = (self.level.force(), self.target.tan());
-        let scale = -self.response.value / (self.gain * self.target.cos());
-        let drive = scale * force.re;
-        // An error of g changes the force and what it is over alike.
-        let by_gain = [-drive];
-        let by_gain = &by_gain[..usize::from(self.u_gain > 0.0)];
-        [
-            Estimate {
-                value: drive,
-                uncertainty: self.level.uncertainty(scale.into(), by_gain),
-            },
-            Estimate {
-                value: self.omega + force.im + tangent * force.re,
-                uncertainty: self.level.uncertainty(Complex::new(tangent, 1.0), &[]),
-            },
-        ]
-    }
-
-    /// What in these periods is not noise.
-    pub fn unsteady(&self) -> Option<Unsteady> {
-        match () {
-            () if !self.level.is_noise() => Some(Unsteady::Scatter(Some(self.level.scatter()))),
-            () if !self.level.is_white() => Some(Unsteady::Drift(self.level.correlation())),
-            () => None,
+    /// Means over the periods, of a motion that no balance describes.
+    pub fn means(cycles: &[Cycle]) -> Self {
+        let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
+        Self {
+            periods: cycles.len(),
+            response: mean(&Cycle::amplitude),
+            phase_error: mean(&|cycle| cycle.phase_error),
+            at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
+            unsteady: Some(Unsteady::Scatter(None)),
         }
     }
+}
+
+/// Drive, m, and frequency, rad/s, that hold a response, m; `gain`: g, 1/s, with its relative uncertainty. The frame turns with `omega`, rad/s, and the phase target
+/// is `target` beyond phase resonance, rad.
+fn resonance(level: &Level, response: f64, [gain, u_gain]: [f64; 2], [omega, target]: [f64; 2]) -> [Estimate; 2] {
+    let (force, tangent) = (level.force(), target.tan());
+    let scale = -response / (gain * target.cos());
+    let drive = scale * force.re;
+    // An error of g changes the force and what it is over alike.
+    let by_gain = [-drive];
+    let by_gain = &by_gain[..usize::from(u_gain > 0.0)];
+    [
+        Estimate {
+            value: drive,
+            uncertainty: level.uncertainty(scale.into(), by_gain),
+        },
+        Estimate {
+            value: omega + force.im + tangent * force.re,
+            uncertainty: level.uncertainty(Complex::new(tangent, 1.0), &[]),
+        },
+    ]
 }
 
 /// Expected components of Lambda1 and their standard deviations, 1/s, from the slopes of drive and frequency over the amplitude; `relative`: drive over
