@@ -209,16 +209,15 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
         let Level { estimate, cycles } = self.script.hold(level, &criterion)?;
         let (run, knowledge) = (&self.script.run, &self.plan.knowledge);
         let averaged = self.script.averaged(&estimate, &cycles);
-        let [base, at] = estimate.at;
-        let omega = at.value;
+        let omega = estimate.at[2].value;
         let mut point = LevelPoint {
-            at: ResonancePoint::new([estimate.response, base, at, estimate.phase_error], knowledge),
+            at: ResonancePoint::new(estimate.at, estimate.phase_error, knowledge),
             // The level as a person would write it.
             level: (1e9 * level / knowledge.numbers.b).round() / 1e9,
             periods: run.periods - start,
             averaged: estimate.periods,
             settled: false,
-            reached: is_reached(estimate.response, level),
+            reached: is_reached(estimate.at[0], level),
             unsteady: estimate.unsteady,
             regime: self.script.regime(&estimate, &cycles),
             regime_by_impacts: averaged[0]

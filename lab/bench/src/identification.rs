@@ -17,7 +17,7 @@ use crate::record::{Record, Sample};
 use vines_rig::unit::Quantity;
 use vines_scene::knowledge::Knowledge;
 use vines_scene::plan::Plan;
-use vines_scene::scene::{Measurand, Units};
+use vines_scene::scene::Units;
 
 pub(crate) use asked::{SAME, departure, is_another};
 pub(crate) use cycle::Cycle;
@@ -28,7 +28,7 @@ pub(crate) use level::{LONGEST_SETTLING, is_off_target};
 pub(crate) use resonance_fit::LevelEstimate;
 pub use response::Tone;
 pub(crate) use response::{
-    Line, classify, drive_harmonics, foreign_tone, regime_by_response, regime_of_leg, subharmonic, without_tones,
+    Line, Span, classify, drive_harmonics, foreign_tone, regime_by_response, subharmonic, without_tones,
 };
 pub use vines_model::regime::{Impact, Regime};
 
@@ -118,13 +118,11 @@ pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, Identifi
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so. So is one without symmetry where
     // there may be no cavity.
     let is_expected = is_wanted(lock.regime, knowledge.is_symmetric && silent.is_none());
-    // Another phase or drive has another motion, of which the wanted one says nothing.
-    if (!is_expected || repeats.is_some())
-        && let Some(departure) = departure(record.hold(), plan)
-    {
-        return Err(IdentificationError::OtherThanAsked { departure, regime: lock.regime });
-    }
     if !is_expected || repeats.is_some() {
+        // Another phase or drive has another motion, of which the wanted one says nothing.
+        if let Some(departure) = departure(record.hold(), plan) {
+            return Err(IdentificationError::OtherThanAsked { departure, regime: lock.regime });
+        }
         let repeats = repeats.filter(|_| is_expected);
         return Err(IdentificationError::Regime { regime: lock.regime, repeats, sigma, c, silent });
     }
@@ -149,16 +147,15 @@ pub(crate) fn is_wanted(regime: Regime, is_symmetric: bool) -> bool {
     matches!(regime, Regime::Symmetric | Regime::Unresolved) || regime == Regime::Asymmetric && !is_symmetric
 }
 
+/// Harmonics that are fitted to a displacement.
+const HARMONICS: usize = 3;
 /// Largest number of harmonics that are fitted: a bound of the work.
 const MOST_HARMONICS: usize = 60;
 
-/// Number of harmonics that belong to the motion in a response of which the sensor measures this, `least` of a displacement: an impact makes those of
-/// a velocity fall as 1/n, and those of an acceleration not at all. What is not fitted counts as noise, for which two fifths of the samples remain.
-pub(crate) fn harmonics_of(measurand: Measurand, samples_per_period: f64, least: usize) -> usize {
-    match measurand {
-        Measurand::Displacement => least,
-        _ => ((0.42 * samples_per_period) as usize).clamp(least, MOST_HARMONICS),
-    }
+/// All harmonics that as many samples per period can show: an impact makes those of a velocity fall as 1/n, and those of an acceleration not at all.
+/// What is not fitted counts as noise, for which two fifths of the samples remain.
+fn most_harmonics(samples_per_period: f64) -> usize {
+    ((0.42 * samples_per_period) as usize).clamp(HARMONICS, MOST_HARMONICS)
 }
 
 // The locked point.
@@ -283,7 +280,7 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
         before: [None; 2],
     }
     .best(approach)?;
-    let [base, omega] = level.at;
+    let omega = level.at[2];
     let of_level = &approach[approach.len() - level.periods..];
     let averaged = of_level.iter().map(|cycle| cycle.samples).sum::<usize>();
     let speed = |sample: &Sample| Some(d.speed(sample.ground_truth?.particle_velocity.abs()));
@@ -296,14 +293,14 @@ fn measure(record: &Record, plan: &Plan) -> Option<Lock> {
         Estimate::mean(&periods.map(|c| mean(c.iter().copied())).collect::<Vec<f64>>())
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
-        (count, Regime::Unknown) => (count, regime_by_response(hold, knowledge, base, omega)),
+        (count, Regime::Unknown) => (count, regime_by_response(hold, knowledge, level.at, Span::Held)),
         by_impacts => by_impacts,
     };
     let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
     let reference = knowledge.target.units.reference;
     let requested = reference.of_metres(plan.requested(omega.value));
     let [requested_e_m, requested_f_n] = reference.base_or_force(requested);
-    let at = ResonancePoint::new([level.response, base, omega, phase_error(&held, knowledge)], knowledge);
+    let at = ResonancePoint::new(level.at, phase_error(&held, knowledge), knowledge);
     Some(Lock {
         at,
         requested_e_m,
@@ -349,7 +346,7 @@ fn approached<'a>(cycles: &'a [Cycle], held: &[Cycle]) -> &'a [Cycle] {
 
 /// Mean phase error over the hold, rad.
 fn phase_error(held: &[Cycle], knowledge: &Knowledge) -> Estimate {
-    let LevelEstimate { response, phase_error, at: [base, _], .. } = LevelEstimate::means(held);
+    let LevelEstimate { phase_error, at: [response, base, _], .. } = LevelEstimate::means(held);
     let [noise, base_noise] = Cycle::noise_of(held, false).map(|noise| noise / (held.len() as f64).sqrt());
     let mut phase_noise = (noise / response.value).hypot(base_noise / base.value);
     // Behind a shaker noise of the readings turns the force itself, by more than that noise.
@@ -413,10 +410,10 @@ pub struct ResonancePoint {
 }
 
 impl ResonancePoint {
-    /// From the amplitudes of response and drive, both in metres of the oscillator, the frequency, rad/s, and the phase error, rad.
-    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], knowledge: &Knowledge) -> Self {
+    /// From the amplitudes of response and drive, both in metres of the oscillator, and the frequency, rad/s, and from the phase error, rad.
+    pub(crate) fn new(at: [Estimate; 3], phase_error: Estimate, knowledge: &Knowledge) -> Self {
         let d = &knowledge.numbers;
-        let [response, base, omega] = knowledge.linear.resolved([response, base, omega]);
+        let [response, base, omega] = knowledge.linear.resolved(at);
         let Units { response: of_response, reference, .. } = knowledge.target.units;
         let drive = |metres: f64| reference.base_or_force(reference.of_metres(metres));
         let ([e_m, f_n], [u_e_m, u_f_n]) = (drive(base.value), drive(base.uncertainty));

@@ -18,8 +18,8 @@ use vines_model::numerics::{Estimate, SIGNIFICANT, lagrange, mean, range};
 
 use super::{CONFIRMED, ControlLoop, ExperimentError, FOLLOWED, SLOWEST_LOOP, Sample, Stage};
 use crate::identification::{
-    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, SAME, Unsteady, is_another, is_wanted,
-    regime_by_response, regime_of_leg, subharmonic, without_tones,
+    Criterion, Cycle, LONGEST_SETTLING, LevelEstimate, Regime, SAME, Span, Unsteady, is_another, is_wanted,
+    regime_by_response, subharmonic, without_tones,
 };
 use crate::rig::{Controller, ControllerError, LoopState, Move, OFF, Rig};
 use vines_rig::unit::short;
@@ -221,7 +221,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let unmet = match estimate.unsteady {
             Some(unsteady) => unsteady.to_string(),
             None => {
-                let Estimate { value, uncertainty } = estimate.at[0].scaled(1.0 / self.requested);
+                let Estimate { value, uncertainty } = estimate.at[1].scaled(1.0 / self.requested);
                 format!("the drive that holds the response is {value:.4} ± {uncertainty:.1e} times the requested one")
             }
         };
@@ -255,7 +255,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             *leg = self.leg(0.0, FOLLOWED, 0.0)?;
         }
         if is_kind(self, leg.regime) {
-            *leg = self.measure(FOLLOWED, true)?;
+            *leg = self.measure(FOLLOWED, Span::AtRest)?;
         }
         let is_there = (leg.last / self.setpoint - 1.0).abs() < LEG_CHANGE;
         Ok(is_there && is_kind(self, leg.regime))
@@ -315,19 +315,15 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             let Level { estimate, cycles } = self.hold(to, &criterion)?;
             // As a leg at rest: over the longest time, a beat would be irregular, too.
             let last = self.last(&cycles[cycles.len().saturating_sub(FOLLOWED)..]);
-            let regime = regime_of_leg(
-                last,
-                self.knowledge,
-                [estimate.response, estimate.at[0], estimate.at[1]],
-                true,
-            );
+            let regime = regime_by_response(last, self.knowledge, estimate.at, Span::AtRest);
             // A level need not show impacts: the legs have.
             if !(self.is_symmetric(regime) || regime == Regime::NotEstablished) {
                 return Ok(false);
             }
-            let next = [estimate.response.value, estimate.at[0].value];
-            self.note_held([next[0], next[1], estimate.at[1].value]);
-            let is_within = !is_another(next[1] - self.requested, estimate.at[0].uncertainty, self.requested);
+            let [response, drive, omega] = estimate.at.map(|one| one.value);
+            self.note_held([response, drive, omega]);
+            let (next, u_drive) = ([response, drive], estimate.at[1].uncertainty);
+            let is_within = !is_another(drive - self.requested, u_drive, self.requested);
             // No nearer than half of the distance before: noise is what is left.
             let is_stuck = is_level && (next[1] - self.requested).abs() > 0.5 * (at[1] - self.requested).abs();
             let not_steady = estimate.unsteady.filter(|_| !criterion.is_met(&estimate));
@@ -342,7 +338,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             }
             // Noise hides what changes between near levels, but not that the slope predicts another change.
             let [far, changed] = [next[0] - at[0], next[1] - at[1]];
-            if is_level && (changed - slope * far).abs() > SIGNIFICANT * estimate.at[0].uncertainty {
+            if is_level && (changed - slope * far).abs() > SIGNIFICANT * u_drive {
                 slope = changed / far;
             }
             (at, is_level) = (next, true);
@@ -352,17 +348,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
     /// The motion at a level is not steady after the longest time.
     fn not_steady(&self, why: Unsteady, estimate: &LevelEstimate, cycles: &[Cycle]) -> ExperimentError {
         let samples = self.averaged(estimate, cycles);
-        let repeats = subharmonic(samples, self.knowledge, estimate.at[1].value).map(Unsteady::Repeats);
+        let repeats = subharmonic(samples, self.knowledge, estimate.at[2].value).map(Unsteady::Repeats);
         ExperimentError::NotSteady {
             periods: cycles.len(),
-            response: self.knowledge.target.units.response.quantity(estimate.response.value),
+            response: self.knowledge.target.units.response.quantity(estimate.at[0].value),
             why: repeats.unwrap_or(why),
         }
     }
 
     /// Whether the drive that holds the response is `drive`, m, as far as its uncertainty and the resolution of a point show.
     fn is_near(&self, estimate: &LevelEstimate, drive: f64) -> bool {
-        let Estimate { value, uncertainty } = estimate.at[0];
+        let Estimate { value, uncertainty } = estimate.at[1];
         (value - drive).abs() < (SIGNIFICANT * uncertainty).max(POINT_RESOLUTION * drive)
     }
 
@@ -407,7 +403,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             cycles.push(self.cycle()?);
             let estimate = criterion.best(&cycles);
             let is_met =
-                estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.response, level));
+                estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.at[0], level));
             // The halves of a transient can agree by chance.
             confirmed = if is_met { confirmed + 1 } else { 0 };
             if cycles.len() >= LONGEST_SETTLING || confirmed >= CONFIRMED {
@@ -415,20 +411,18 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
             }
         };
         let estimate = estimate.unwrap_or_else(|| LevelEstimate::means(&cycles[cycles.len() / 2..]));
-        let [drive, omega] = estimate.at.map(|quantity| quantity.value);
-        if drive.is_finite() && omega.is_finite() {
-            let response = estimate.response.value;
+        let held = estimate.at.map(|quantity| quantity.value);
+        if held.iter().all(|value| value.is_finite()) {
             // Of points at one level, as at a limit of the drive, only the last one predicts the next.
-            self.levels.retain(|held| (held[0] - response).abs() > SAME * level);
-            self.levels.push([response, drive, omega]);
+            self.levels.retain(|before| (before[0] - held[0]).abs() > SAME * level);
+            self.levels.push(held);
         }
         Ok(Level { estimate, cycles })
     }
 
     /// The regime of the periods of a level that its estimate is from.
     pub fn regime(&self, estimate: &LevelEstimate, cycles: &[Cycle]) -> Regime {
-        let [base, omega] = estimate.at;
-        regime_by_response(self.averaged(estimate, cycles), self.knowledge, base, omega)
+        regime_by_response(self.averaged(estimate, cycles), self.knowledge, estimate.at, Span::Held)
     }
 
     /// The samples of these periods, the last that were taken.
@@ -533,11 +527,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         };
         self.run.hold_response(to)?;
         self.setpoint = to.response;
-        self.measure(periods, false)
+        self.measure(periods, Span::Moving)
     }
 
     /// Measures over `periods`, without foreign tones, which disturb so few periods.
-    fn measure(&mut self, periods: usize, is_at_rest: bool) -> Result<Leg, ExperimentError> {
+    fn measure(&mut self, periods: usize, span: Span) -> Result<Leg, ExperimentError> {
         let (begin, turns) = (self.run.samples.len(), self.run.periods);
         for _ in 0..periods.max(LevelEstimate::FEWEST) {
             self.run.period(self.stage)?;
@@ -548,19 +542,19 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Script<'b, 'a, R, C> {
         let samples = cleaned.as_deref().unwrap_or(raw);
         let cycles = Cycle::all(samples, turns, self.knowledge);
         let Some(fit) = LevelEstimate::of(&cycles, self.knowledge, None, false) else {
-            return self.measure(periods, is_at_rest);
+            return self.measure(periods, span);
         };
-        let [drive, omega] = fit.at;
+        let [response, drive, omega] = fit.at.map(|one| one.value);
         let leg = Leg {
-            response: fit.response.value,
+            response,
             last: cycles[cycles.len() - 1].amplitude(),
-            drive: drive.value,
-            omega: omega.value,
-            regime: regime_of_leg(samples, self.knowledge, [fit.response, drive, omega], is_at_rest),
+            drive,
+            omega,
+            regime: regime_by_response(samples, self.knowledge, fit.at, span),
         };
-        self.moving = [leg.response, leg.drive, leg.omega];
+        self.moving = [response, drive, omega];
         self.levels.clear();
-        self.tried = range(self.tried, [leg.response]);
+        self.tried = range(self.tried, [response]);
         Ok(leg)
     }
 

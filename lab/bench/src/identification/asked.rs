@@ -25,7 +25,7 @@ pub(crate) fn departure(samples: &[Sample], plan: &Plan) -> Option<String> {
     }
     let [noise, base_noise] = Cycle::noise_of(&cycles, false);
     let measured = LevelEstimate::means(&cycles);
-    let [drive, omega] = measured.at;
+    let [response, drive, omega] = measured.at;
     let requested = plan.requested(omega.value);
     let drives: Vec<f64> = cycles.iter().map(|cycle| cycle.base.norm() - requested).collect();
     let is_another = departs(&drives, (SAME * requested).max(SIGNIFICANT * base_noise));
@@ -35,7 +35,7 @@ pub(crate) fn departure(samples: &[Sample], plan: &Plan) -> Option<String> {
         .iter()
         .map(|cycle| cycle.phase_error - reported.unwrap_or(0.0))
         .collect();
-    let phase_noise = (noise / measured.response.value).hypot(base_noise / drive.value);
+    let phase_noise = (noise / response.value).hypot(base_noise / drive.value);
     let mut departures = Vec::new();
     if departs(&phases, plan.lock.lock.phase_tolerance + SIGNIFICANT * phase_noise) {
         let Estimate { value, uncertainty } = measured.phase_error.scaled(1_f64.to_degrees());

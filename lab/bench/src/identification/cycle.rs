@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DVector};
 use vines_model::numerics::{HarmonicBasis, mean};
 
-use super::harmonics_of;
+use super::{HARMONICS, most_harmonics};
 use crate::record::{Sample, drive_phases};
 use vines_scene::knowledge::Knowledge;
 use vines_scene::scene::Measurand;
@@ -34,9 +34,6 @@ pub struct Cycle {
     /// Number of samples.
     pub samples: usize,
 }
-
-/// Harmonics that are fitted to a displacement.
-const HARMONICS: usize = 3;
 
 /// What is fitted to a channel over one period of the drive.
 struct Bases {
@@ -83,14 +80,13 @@ impl Cycle {
         let uniform: Vec<f64> = (0..samples.len())
             .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)
             .collect();
-        let harmonics = |measurand| harmonics_of(measurand, samples.len() as f64, HARMONICS);
+        let all = most_harmonics(samples.len() as f64);
         // Impacts jerk the force of a shaker as they jerk an acceleration.
-        let in_base = if target.through_shaker {
-            harmonics(Measurand::Acceleration)
-        } else {
-            HARMONICS
+        let in_base = if target.through_shaker { all } else { HARMONICS };
+        let in_response = match target.measurands[0] {
+            Measurand::Displacement => HARMONICS,
+            _ => all,
         };
-        let in_response = harmonics(target.measurands[0]);
         let of_base = Bases::new(&uniform, in_base);
         let of_response = (in_response != in_base).then(|| Bases::new(&uniform, in_response));
         let Bases { basis, drifting, .. } = &of_base;

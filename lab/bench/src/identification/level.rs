@@ -86,7 +86,7 @@ impl Criterion {
 
     /// Largest uncertainty over the largest allowed.
     fn size(&self, estimate: &LevelEstimate) -> f64 {
-        let [drive, omega] = estimate.at;
+        let [_, drive, omega] = estimate.at;
         let allowed = self.precision * drive.value.abs();
         let of_omega = self.knowledge.linear.omega0 * allowed / self.largest;
         (drive.uncertainty / allowed).max(omega.uncertainty / of_omega)
@@ -112,8 +112,7 @@ impl Criterion {
     fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
         let fit = |slopes| LevelEstimate::of(cycles, &self.knowledge, slopes, true);
         let mut level = fit(None)?;
-        let [base, omega] = level.at.map(|value| value.value);
-        if let Some(known) = self.slopes([level.response.value, base, omega]) {
+        if let Some(known) = self.slopes(level.at.map(|quantity| quantity.value)) {
             level = fit(Some(known))?;
         }
         let is_finite = level.at.iter().all(|part| (part.value + part.uncertainty).is_finite());

@@ -28,12 +28,10 @@ use vines_scene::scene::{Definition, Reference, Sensor};
 pub struct LevelEstimate {
     /// Number of periods.
     pub periods: usize,
-    /// Mean amplitude of the response, m.
-    pub response: Estimate,
+    /// Mean amplitude of the response, m, and drive, m, and frequency, rad/s, of phase resonance at this amplitude.
+    pub at: [Estimate; 3],
     /// Mean phase error, rad.
     pub phase_error: Estimate,
-    /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
-    pub at: [Estimate; 2],
     /// What in the window is not noise; `None` if the fit describes it.
     pub unsteady: Option<Unsteady>,
 }
@@ -112,9 +110,8 @@ impl LevelEstimate {
         };
         Some(Self {
             periods: cycles.len(),
-            response,
+            at: resonance(&level, response, [gain, u_gain], [omega, target]),
             phase_error: of(mean(cycles.iter().map(|cycle| cycle.phase_error)), phase_noise),
-            at: resonance(&level, response.value, [gain, u_gain], [omega, target]),
             unsteady,
         })
     }
@@ -124,24 +121,28 @@ impl LevelEstimate {
         let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
         Self {
             periods: cycles.len(),
-            response: mean(&Cycle::amplitude),
+            at: [
+                mean(&Cycle::amplitude),
+                mean(&|cycle| cycle.base.norm()),
+                mean(&|cycle| cycle.omega),
+            ],
             phase_error: mean(&|cycle| cycle.phase_error),
-            at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
             unsteady: Some(Unsteady::Scatter(None)),
         }
     }
 }
 
-/// Drive, m, and frequency, rad/s, that hold a response, m; `gain`: g, 1/s, with its relative uncertainty. The frame turns with `omega`, rad/s, and the phase target
-/// is `target` beyond phase resonance, rad.
-fn resonance(level: &Level, response: f64, [gain, u_gain]: [f64; 2], [omega, target]: [f64; 2]) -> [Estimate; 2] {
+/// A response, m, and the drive, m, and the frequency, rad/s, that hold it; `gain`: g, 1/s, with its relative uncertainty. The frame turns with `omega`, rad/s,
+/// and the phase target is `target` beyond phase resonance, rad.
+fn resonance(level: &Level, response: Estimate, [gain, u_gain]: [f64; 2], [omega, target]: [f64; 2]) -> [Estimate; 3] {
     let (force, tangent) = (level.force(), target.tan());
-    let scale = -response / (gain * target.cos());
+    let scale = -response.value / (gain * target.cos());
     let drive = scale * force.re;
     // An error of g changes the force and what it is over alike.
     let by_gain = [-drive];
     let by_gain = &by_gain[..usize::from(u_gain > 0.0)];
     [
+        response,
         Estimate {
             value: drive,
             uncertainty: level.uncertainty(scale.into(), by_gain),

@@ -7,18 +7,19 @@
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Display, Formatter};
+use std::ops::Mul;
 
-use nalgebra::DVector;
+use nalgebra::{DVector, RowVector3};
 use num_complex::Complex64;
 use serde::Serialize;
-use vines_model::numerics::{Estimate, HarmonicBasis, golden_section, mean};
+use vines_model::numerics::{Estimate, HarmonicBasis, complex_fit, golden_section, mean};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
-use super::{Cycle, harmonics_of};
+use super::{Cycle, most_harmonics};
 use crate::record::Sample;
 use vines_scene::knowledge::Knowledge;
 use vines_scene::linear::{Impacts, impacts_by_harmonic, impacts_by_resonance};
-use vines_scene::scene::{Definition, Dimensionless, Measurand, Sensor};
+use vines_scene::scene::{Definition, Dimensionless, Sensor};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY_RESIDUAL: f64 = 3e-3;
@@ -31,25 +32,22 @@ const SIGNIFICANT_HARMONIC: f64 = 4.0;
 /// Smallest even harmonic of an asymmetric motion, over the larger odd one next to it: of the second over the third, symmetric motions have about
 /// 0.01, irregular ones 2 and more.
 const ASYMMETRIC: f64 = 0.5;
-/// Harmonics that are fitted to a displacement.
-const RESPONSE_HARMONICS: usize = 5;
 
-/// All harmonics that the samples can show.
-const ALL_HARMONICS: Measurand = Measurand::Acceleration;
-
-/// A straight line and this number of harmonics, whose amplitudes are quadratic in time for the fundamental, and constant for the others, for `n` samples
-/// `turn` rad of the motion apart.
-fn basis(n: usize, turn: f64, harmonics: usize) -> HarmonicBasis {
+/// A straight line and all harmonics that the samples can show, whose amplitudes are quadratic in time for the fundamental, and constant for the others,
+/// for `n` samples `turn` rad of the motion apart.
+fn basis(n: usize, turn: f64) -> HarmonicBasis {
     let phases: Vec<f64> = (0..n).map(|n| n as f64 * turn).collect();
-    let mut degrees = vec![Some(0); harmonics];
+    let mut degrees = vec![Some(0); most_harmonics(TAU / turn)];
     degrees[0] = Some(2);
     HarmonicBasis::new(&phases, 1, &degrees)
 }
 
-/// Harmonic content of the response, relative to its fundamental.
+/// Harmonic content of what a channel reads, relative to its fundamental.
 #[derive(Debug, Clone)]
 struct Content {
-    /// Amplitude of the fundamental, m.
+    /// How often the sensor differentiates the displacement.
+    order: i32,
+    /// Amplitude of the fundamental, as it is read.
     amplitude: f64,
     /// Amplitudes of the harmonics from the second on, relative.
     harmonics: Vec<f64>,
@@ -69,13 +67,13 @@ impl Content {
         self.rest > STEADY_RESIDUAL && self.noise < NOISE_SHARE * self.rest
     }
 
-    /// Whether an even harmonic is more than noise and more than [`ASYMMETRIC`] of the larger odd one next to it, as displacements. `order`: how
-    /// often the sensor differentiates them. The probability of a false alarm does not depend on the number of harmonics.
-    fn is_asymmetric(&self, order: i32) -> bool {
+    /// Whether an even harmonic is more than noise and more than [`ASYMMETRIC`] of the larger odd one next to it, as displacements. The probability of a
+    /// false alarm does not depend on the number of harmonics.
+    fn is_asymmetric(&self) -> bool {
         let displacement = |n: usize| {
             self.harmonics
                 .get(n - 2)
-                .map_or(0.0, |harmonic| harmonic / (n as f64).powi(order))
+                .map_or(0.0, |harmonic| harmonic / (n as f64).powi(self.order))
         };
         // Of N samples per period, the odd harmonic N - k looks like k. Up to a third of N it has half of the velocity of those next to k at most.
         let even = (2..self.harmonics.len().min(self.samples_per_period / 3) + 2).step_by(2);
@@ -86,15 +84,9 @@ impl Content {
         })
     }
 
-    /// Fits what a channel reads, 0 the response or 1 the reference, with as many harmonics as belong to what `measurand` says; `None` for too few
-    /// samples or no motion. `is_moving`: the motion may change in the meantime.
-    fn of(
-        samples: &[Sample],
-        knowledge: &Knowledge,
-        omega: f64,
-        (channel, measurand): (usize, Measurand),
-        is_moving: bool,
-    ) -> Option<Self> {
+    /// Fits what a channel reads, 0 the response or 1 the reference, of a motion of the frequency `omega`, rad/s; `None` for too few samples or no motion.
+    /// `is_moving`: the motion may change in the meantime.
+    fn of(samples: &[Sample], knowledge: &Knowledge, omega: f64, channel: usize, is_moving: bool) -> Option<Self> {
         let reading = |sample: &Sample| match channel {
             0 => sample.sensors.response,
             _ => sample.sensors.reference.unwrap_or(f64::NAN),
@@ -102,12 +94,11 @@ impl Content {
         // The phase of the response is more uniform than the phase of a drive that a loop still corrects.
         let (n, turn) = (samples.len(), omega * knowledge.sample_time);
         let mut values = DVector::from_iterator(n, samples.iter().map(reading));
-        let count = harmonics_of(measurand, TAU / turn, RESPONSE_HARMONICS);
-        let of_all = basis(n, turn, count);
+        let of_all = basis(n, turn);
         if n < 2 * of_all.terms() {
             return None;
         }
-        let fitted = |values: &DVector<f64>| Self::fitted(&of_all, values, omega, knowledge);
+        let fitted = |values: &DVector<f64>| Self::fitted(&of_all, values, omega, knowledge, channel);
         let (mut content, mut rest) = fitted(&values)?;
         let mut lines: Vec<Line> = Vec::new();
         // Tones and harmonics are fitted in turn: what a tone has in common with the harmonics remains in the residual.
@@ -123,15 +114,15 @@ impl Content {
         }
         let content = Self { tones: lines, ..content };
         match is_moving {
-            true => content.changed(&values, turn, count),
+            true => content.changed(&values, turn),
             false => Some(content),
         }
     }
 
     /// With what a change of the motion, as both halves of the values show it, adds to the errors of the harmonics.
-    fn changed(mut self, values: &DVector<f64>, turn: f64, count: usize) -> Option<Self> {
+    fn changed(mut self, values: &DVector<f64>, turn: f64) -> Option<Self> {
         let (n, half) = (values.len(), values.len() / 2);
-        let of_half = basis(half, turn, count);
+        let of_half = basis(half, turn);
         let [first, second] =
             [0, n - half].map(|from| of_half.fit(&DVector::from_column_slice(&values.as_slice()[from..][..half])));
         let halves = [first?, second?];
@@ -148,12 +139,13 @@ impl Content {
         Some(self)
     }
 
-    /// The content of these values, and their residual, for a motion of the frequency `omega`, rad/s.
+    /// The content of these values of a channel, and their residual.
     fn fitted(
         basis: &HarmonicBasis,
         values: &DVector<f64>,
         omega: f64,
         knowledge: &Knowledge,
+        channel: usize,
     ) -> Option<(Self, DVector<f64>)> {
         let Knowledge { sample_time, target, .. } = *knowledge;
         let n = values.len();
@@ -171,6 +163,7 @@ impl Content {
             .map(|n| fit.harmonic(n).norm() / amplitude)
             .collect();
         let content = Self {
+            order: target.measurands[channel].order(),
             amplitude,
             errors: (2..=fit.harmonics()).map(error).collect(),
             harmonics,
@@ -185,7 +178,7 @@ impl Content {
 
 /// The largest foreign tone in the response of these samples, if they would be irregular with it. `omega` (rad/s) is the frequency of the motion.
 pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Tone> {
-    let content = Content::of(samples, knowledge, omega, (0, ALL_HARMONICS), false)?;
+    let content = Content::of(samples, knowledge, omega, 0, false)?;
     let tones = content.tones.iter();
     let largest = tones.max_by(|a, b| a.amplitude().total_cmp(&b.amplitude()))?;
     Some(Tone {
@@ -196,7 +189,7 @@ pub(crate) fn foreign_tone(samples: &[Sample], knowledge: &Knowledge, omega: f64
 
 /// These samples without the foreign tones in their response; `None` if there are none.
 pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<Vec<Sample>> {
-    let tones = Content::of(samples, knowledge, omega, (0, knowledge.target.measurands[0]), false)?.tones;
+    let tones = Content::of(samples, knowledge, omega, 0, false)?.tones;
     let mut cleaned = samples.to_vec();
     for (n, sample) in cleaned.iter_mut().enumerate() {
         sample.sensors.response -= tones.iter().map(|line| line.at(n)).sum::<f64>();
@@ -204,26 +197,15 @@ pub(crate) fn without_tones(samples: &[Sample], knowledge: &Knowledge, omega: f6
     (!tones.is_empty()).then_some(cleaned)
 }
 
-/// Harmonics 2 to 7 of the reference over its first; `None` without a reference, and for fewer than two samples per period of the last.
+/// Harmonics 2 to 7 of the reference over its first; `None` without a reference, and where the samples do not show all of them.
 pub fn drive_harmonics(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<[f64; 6]> {
-    let turn = omega * knowledge.sample_time;
-    let values: Option<Vec<f64>> = samples.iter().map(|sample| sample.sensors.reference).collect();
-    let values = values.filter(|_| 7.0 * turn < PI)?;
-    let fit = basis(values.len(), turn, 7).fit(&DVector::from_vec(values))?;
-    let first = fit.harmonic(1).norm();
-    (first > 0.0).then(|| std::array::from_fn(|n| fit.harmonic(n + 2).norm() / first))
+    let content = Content::of(samples, knowledge, omega, 1, false)?;
+    content.harmonics.first_chunk().copied()
 }
 
-/// Whether the reference shows an asymmetric motion: behind a shaker it also contains the impacts, and more of them where the stinger resonates.
-fn is_asymmetric_by_reference(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> bool {
-    let content = knowledge
-        .shaker
-        .and_then(|_| Content::of(samples, knowledge, omega, (1, ALL_HARMONICS), false));
-    content.is_some_and(|content| content.is_asymmetric(knowledge.target.measurands[1].order()))
-}
-
-/// Longest cycle of periods that a bifurcation of a 1:1 motion leads to and locks in place: the strong resonances are those of one to four periods.
-const LONGEST_CYCLE: usize = 4;
+/// Cycles of periods that a bifurcation of a 1:1 motion leads to and locks in place, the strong resonances of two to four periods: number of periods, and
+/// turns in them.
+const CYCLES: [(usize, usize); 5] = [(2, 1), (3, 1), (3, 2), (4, 1), (4, 3)];
 
 /// The number of periods after which the motion in these samples of a hold repeats, if it is more than one. `omega` (rad/s): its frequency.
 ///
@@ -233,100 +215,75 @@ const LONGEST_CYCLE: usize = 4;
 pub(crate) fn subharmonic(samples: &[Sample], knowledge: &Knowledge, omega: f64) -> Option<usize> {
     let cleaned = without_tones(samples, knowledge, omega);
     let cycles = Cycle::all(cleaned.as_deref().unwrap_or(samples), 0.0, knowledge);
-    let trend = HarmonicBasis::new(&vec![0.0; cycles.len()], 2, &[]);
-    let sum: Complex64 = cycles.iter().map(|cycle| cycle.response).sum();
-    // Parts in phase with the mean, and a quarter of a period beside it.
-    let deviations = |turn: Complex64| {
-        let part = |cycle: &Cycle| (cycle.response * turn * sum.conj()).re / sum.norm();
-        let values = DVector::from_iterator(cycles.len(), cycles.iter().map(part));
-        Some(trend.residual(&values, &trend.fit(&values)?))
+    let row = |k: usize| {
+        let time = Complex64::from(2.0 * k as f64 / cycles.len() as f64 - 1.0);
+        RowVector3::new(Complex64::ONE, time, time * time)
     };
-    let (along, beside) = (deviations(Complex64::ONE)?, deviations(-Complex64::I)?);
+    let (trend, _) = complex_fit(cycles.iter().enumerate().map(|(k, cycle)| (row(k), cycle.response)))?;
+    let deviation = |(k, cycle): (usize, &Cycle)| cycle.response - (row(k) * trend)[0];
+    let deviations: Vec<Complex64> = cycles.iter().enumerate().map(deviation).collect();
     let free = cycles.len() as f64 - 4.0;
     let noise = 2.0 * mean(cycles.iter().map(|cycle| cycle.noise[0]));
-    let (total, least) = (along.norm_squared() + beside.norm_squared(), free * noise);
-    let chance = |turns: f64| {
-        let values = along.iter().zip(&beside).map(|(re, im)| Complex64::new(*re, *im));
-        let line = values
-            .enumerate()
-            .map(|(k, value)| value * Complex64::cis(-TAU * turns * k as f64));
-        let power = line.sum::<Complex64>().norm_sqr() / cycles.len() as f64;
-        (1.0 + power / (total - power).max(least)).powf(-free)
+    let total: f64 = deviations.iter().map(Complex64::norm_sqr).sum();
+    let chance = |(periods, turns): (usize, usize)| {
+        let line = transform(&deviations, TAU * turns as f64 / periods as f64);
+        let power = line.norm_sqr() / cycles.len() as f64;
+        (1.0 + power / (total - power).max(free * noise)).powf(-free)
     };
-    // Two quarters of a turn are a half.
-    let turns = (2..=LONGEST_CYCLE).flat_map(|m| (1..m).filter(move |j| *j == 1 || m % j > 0).map(move |j| (m, j)));
-    let lines: Vec<(usize, f64)> = turns.map(|(m, j)| (m, chance(j as f64 / m as f64))).collect();
-    let (periods, chance) = lines.iter().min_by(|one, other| one.1.total_cmp(&other.1))?;
-    (chance * (lines.len() as f64) < (-0.5 * SIGNIFICANT_HARMONIC.powi(2)).exp()).then_some(*periods)
+    let lines = CYCLES.map(|cycle| (cycle.0, chance(cycle)));
+    let (periods, chance) = lines.into_iter().min_by(|one, other| one.1.total_cmp(&other.1))?;
+    (chance * (lines.len() as f64) < (-0.5 * SIGNIFICANT_HARMONIC.powi(2)).exp()).then_some(periods)
 }
 
-/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase target,
-/// and `omega` (rad/s) its frequency.
+/// Periods from which a regime is determined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Span {
+    /// A few periods under the control of a loop, for the choice of the next move. What the harmonics do not describe is the way of the setpoint.
+    Moving,
+    /// A few periods at a setpoint that rests, for the choice of the next move.
+    AtRest,
+    /// A hold, or a level.
+    Held,
+}
+
+/// The regime determined from the response of these samples. `at`: mean response, m, the base, m, that holds it at the phase target, and frequency, rad/s.
 ///
 /// Impacts need evidence: frequency and loss that no particle between carried and free produces; without a linear response that was measured on
 /// the rig, a third harmonic that none produces.
-pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, base: Estimate, omega: Estimate) -> Regime {
-    match Content::of(samples, knowledge, omega.value, (0, ALL_HARMONICS), false) {
-        None => Regime::Unknown,
-        Some(content) if content.is_irregular() => Regime::Other,
-        Some(content) => {
-            let coloured = knowledge.target.colour(omega.value, knowledge.sample_time);
-            let noise = content.rest * (2.0 * coloured / samples.len() as f64).sqrt();
-            let amplitude = content.amplitude * knowledge.target.displacement(0, omega.value).norm();
-            let response = Estimate::new(amplitude, &[noise * amplitude]);
-            // The parameters of a simulation are known.
-            let is_known = knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
-            regime_of(&content, samples, knowledge, [response, base, omega], is_known)
-        }
-    }
-}
-
-/// [`regime_by_response`] of a few periods under the control of a loop, for the choice of the next move: the linear response counts as known. While the
-/// setpoint moves, what the harmonics do not describe is the way, and not irregular. `at`: mean response, m, base, m, and frequency, rad/s.
-pub(crate) fn regime_of_leg(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3], is_at_rest: bool) -> Regime {
-    match Content::of(samples, knowledge, at[2].value, (0, ALL_HARMONICS), true) {
-        None => Regime::Unknown,
-        Some(content) if is_at_rest && content.is_irregular() => Regime::Other,
-        Some(content) => regime_of(&content, samples, knowledge, at, true),
-    }
-}
-
-fn regime_of(
-    content: &Content,
-    samples: &[Sample],
-    knowledge: &Knowledge,
-    at: [Estimate; 3],
-    is_known: bool,
-) -> Regime {
-    let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
-    let (target, omega) = (knowledge.target, at[2]);
-    // The force on the mass M over its inertia in the fundamental.
-    let square = (3.0 * omega.value / omega0).powi(2);
-    let force = |harmonic: f64| 9.0 * (square - 1.0) * harmonic / over_v(definition, square);
-    let third_harmonic = content.harmonics[1];
-    let third = Estimate {
-        value: force(third_harmonic),
-        uncertainty: force(content.errors[1]),
+pub(crate) fn regime_by_response(samples: &[Sample], knowledge: &Knowledge, at: [Estimate; 3], span: Span) -> Regime {
+    let (target, omega) = (knowledge.target, at[2].value);
+    let Some(content) = Content::of(samples, knowledge, omega, 0, span != Span::Held) else {
+        return Regime::Unknown;
     };
-    let significant = SIGNIFICANT_HARMONIC * content.errors[1];
+    if span != Span::Moving && content.is_irregular() {
+        return Regime::Other;
+    }
+    let Dimensionless { epsilon, definition, omega0, .. } = knowledge.numbers;
+    let third = Estimate { value: content.harmonics[1], uncertainty: content.errors[1] };
+    let has_third = third.value > SIGNIFICANT_HARMONIC * third.uncertainty;
+    // The force on the mass M over its inertia in the fundamental.
+    let square = (3.0 * omega / omega0).powi(2);
+    let force = third.scaled(9.0 * (square - 1.0) / over_v(definition, square));
+    // The parameters of a simulation are known; for the choice of a move, they count as known.
+    let is_known =
+        span != Span::Held || knowledge.is_measured || samples.iter().any(|sample| sample.ground_truth.is_some());
     let by_resonance = match is_known {
         true => impacts_by_resonance(&knowledge.linear, at, target.phase, epsilon),
         false => Impacts::Doubtful,
     };
-    // Where the resonance does not tell, a third harmonic may.
-    let impacts = match by_resonance {
-        Impacts::Doubtful if third_harmonic > significant && impacts_by_harmonic(third, epsilon) == Impacts::Needed => {
-            Impacts::Needed
-        }
-        by_resonance => by_resonance,
+    // Behind a shaker the reference also contains the impacts, and more of them where the stinger resonates.
+    let of_reference = || Content::of(samples, knowledge, omega, 1, false);
+    let is_asymmetric = || {
+        content.is_asymmetric() || knowledge.shaker.is_some() && of_reference().is_some_and(|one| one.is_asymmetric())
     };
-    match impacts {
+    // Where the resonance does not tell, a third harmonic may.
+    let by_harmonic = has_third && impacts_by_harmonic(force, epsilon) == Impacts::Needed;
+    match by_resonance {
         Impacts::NotNeeded => Regime::NoImpacts,
-        Impacts::Doubtful => Regime::NotEstablished,
-        Impacts::Needed if content.is_asymmetric(target.measurands[0].order()) => Regime::Asymmetric,
-        Impacts::Needed if is_asymmetric_by_reference(samples, knowledge, omega.value) => Regime::Asymmetric,
-        Impacts::Needed if third_harmonic > significant => Regime::Symmetric,
-        Impacts::Needed => Regime::Unresolved,
+        Impacts::Doubtful if !by_harmonic => Regime::NotEstablished,
+        _ if is_asymmetric() => Regime::Asymmetric,
+        _ if has_third => Regime::Symmetric,
+        _ => Regime::Unresolved,
     }
 }
 
@@ -368,14 +325,14 @@ impl Display for Tone {
 pub(crate) struct Line {
     /// Frequency, rad per sample.
     pub turn: f64,
-    /// Amplitudes of the cosine and the sine.
-    parts: [f64; 2],
+    /// Complex amplitude a of `Re(a exp(i turn n))`.
+    phasor: Complex64,
 }
 
 impl Line {
     /// The strongest line of these values; where there are many, the strongest of the last ones.
     pub fn strongest(values: &[f64]) -> Self {
-        let power = |values: &[f64], turn: f64| transform(values, turn).iter().map(|part| part * part).sum::<f64>();
+        let power = |values: &[f64], turn: f64| transform(values, turn).norm_sqr();
         let highest = |values: &[f64], turn: f64, width: f64| {
             golden_section(turn - width, turn + width, |turn| -power(values, turn))
         };
@@ -386,21 +343,17 @@ impl Line {
             .map(|turn| (turn, power(last, turn)))
             .fold((bin, 0.0), |best, next| if next.1 > best.1 { next } else { best });
         let turn = highest(values, highest(last, coarse, bin), fine);
-        let scale = 2.0 / values.len() as f64;
-        Self {
-            turn,
-            parts: transform(values, turn).map(|part| scale * part),
-        }
+        let phasor = transform(values, turn) * (2.0 / values.len() as f64);
+        Self { turn, phasor }
     }
 
     pub fn amplitude(&self) -> f64 {
-        self.parts[0].hypot(self.parts[1])
+        self.phasor.norm()
     }
 
     /// The value at a sample.
     pub fn at(&self, sample: usize) -> f64 {
-        let (sine, cosine) = (self.turn * sample as f64).sin_cos();
-        self.parts[0] * cosine + self.parts[1] * sine
+        (self.phasor * Complex64::cis(self.turn * sample as f64)).re
     }
 
     /// Whether no motion of the particle produces it.
@@ -419,15 +372,14 @@ fn over_v(definition: Definition, square: f64) -> f64 {
     }
 }
 
-/// Sums of the values times cosine and sine.
-fn transform(values: &[f64], turn: f64) -> [f64; 2] {
-    let (sine, cosine) = turn.sin_cos();
-    let (mut sums, mut rotor) = ([0.0; 2], [1.0, 0.0]);
+/// Sum of the values times `exp(-i turn n)`.
+fn transform<T: Copy + Mul<Complex64, Output = Complex64>>(values: &[T], turn: f64) -> Complex64 {
+    let (mut sum, mut rotor, step) = (Complex64::ZERO, Complex64::ONE, Complex64::cis(-turn));
     for value in values {
-        sums = [sums[0] + value * rotor[0], sums[1] + value * rotor[1]];
-        rotor = [rotor[0] * cosine - rotor[1] * sine, rotor[1] * cosine + rotor[0] * sine];
+        sum += *value * rotor;
+        rotor *= step;
     }
-    sums
+    sum
 }
 
 // The regime, from the impacts that a simulated rig reports.
@@ -505,7 +457,8 @@ mod tests {
             for window in [&samples[1000..3000], &samples[4000..]] {
                 assert_eq!(foreign_tone(window, &knowledge, drive.omega), None, "{settings:?}");
                 let exact = |value| Estimate { value, uncertainty: 0.0 };
-                let regime = regime_by_response(window, &knowledge, exact(drive.amplitude), exact(drive.omega));
+                let at = [knowledge.numbers.b, drive.amplitude, drive.omega].map(exact);
+                let regime = regime_by_response(window, &knowledge, at, Span::Held);
                 irregular += usize::from(regime == Regime::Other);
             }
         }
