@@ -18,6 +18,8 @@ pub struct Step {
     gain: Matrix2<f64>,
     /// Makes the innovation one of covariance 1.
     whitening: Matrix2<f64>,
+    /// Whether the period says something.
+    is_used: bool,
 }
 
 impl Step {
@@ -34,17 +36,19 @@ impl Step {
         }
         let corrected = predicted - gain * predicted;
         let corrected = 0.5 * (corrected + corrected.transpose());
-        Self { transition, predicted, corrected, gain, whitening }
+        Self {
+            transition,
+            predicted,
+            corrected,
+            gain,
+            whitening,
+            is_used: noise.is_some(),
+        }
     }
 
-    /// Moves a state on, and corrects it by the difference `direct` of what is measured from it. Returns the state before the correction and the whitened
-    /// innovation.
-    pub fn advance(
-        &self,
-        state: &mut Vector2<f64>,
-        increment: Vector2<f64>,
-        direct: Vector2<f64>,
-    ) -> [Vector2<f64>; 2] {
+    /// Moves a state on by `increment`, and corrects it by the difference `direct` of what is measured from it. Returns the state before the correction and
+    /// the whitened innovation.
+    fn advance(&self, state: &mut Vector2<f64>, [increment, direct]: [Vector2<f64>; 2]) -> [Vector2<f64>; 2] {
         let predicted = self.transition * *state + increment;
         let innovation = direct + predicted;
         *state = predicted - self.gain * innovation;
@@ -52,16 +56,42 @@ impl Step {
     }
 }
 
-/// The backward pass: states from all periods, from those before and after the correction at each.
-pub fn smooth(steps: &[&Step], states: &[[Vector2<f64>; 2]]) -> Vec<Vector2<f64>> {
-    let mut all: Vec<Vector2<f64>> = states.iter().map(|[_, corrected]| *corrected).collect();
-    for k in (1..states.len()).rev() {
+/// Whitened innovations: a row for each of `rows`, the record and units of the unknowns, and two columns for each period that says something. `acts`:
+/// increment of the state and difference of what is measured from it, at a period, of a row.
+pub fn whiten(steps: &[Step], rows: usize, acts: impl Fn(usize, usize) -> [Vector2<f64>; 2]) -> DMatrix<f64> {
+    let used = steps.iter().filter(|step| step.is_used).count();
+    let mut states = vec![Vector2::zeros(); rows];
+    let mut white = DMatrix::zeros(rows, 2 * used);
+    let mut column = 0;
+    for (k, step) in steps.iter().enumerate() {
+        for (row, state) in states.iter_mut().enumerate() {
+            let [_, innovation] = step.advance(state, acts(k, row));
+            if step.is_used {
+                white
+                    .fixed_view_mut::<1, 2>(row, column)
+                    .copy_from(&innovation.transpose());
+            }
+        }
+        column += if step.is_used { 2 } else { 0 };
+    }
+    white
+}
+
+/// States from all periods, those before and those after: the filter, and the backward pass. `acts`: as in [`whiten`], of the record with its unknowns.
+pub fn smooth(steps: &[Step], acts: impl Fn(usize) -> [Vector2<f64>; 2]) -> Vec<Vector2<f64>> {
+    let mut state = Vector2::zeros();
+    let forward = |(k, step): (usize, &Step)| {
+        let [predicted, _] = step.advance(&mut state, acts(k));
+        (predicted, state)
+    };
+    let (predicted, mut all): (Vec<_>, Vec<_>) = steps.iter().enumerate().map(forward).unzip();
+    for k in (1..all.len()).rev() {
         let back = steps[k - 1].corrected * steps[k].transition.transpose();
         let back = steps[k]
             .predicted
             .try_inverse()
             .map_or(Matrix2::zeros(), |inverse| back * inverse);
-        let ahead = all[k] - states[k][0];
+        let ahead = all[k] - predicted[k];
         all[k - 1] += back * ahead;
     }
     all
@@ -70,7 +100,6 @@ pub fn smooth(steps: &[&Step], states: &[[Vector2<f64>; 2]]) -> Vec<Vector2<f64>
 /// The filter of a record.
 pub struct Filter {
     periods: Vec<Step>,
-    used: Vec<bool>,
     /// Sum of the logarithms of the determinants of the innovations' covariances.
     pub logarithms: f64,
 }
@@ -121,39 +150,30 @@ impl Filter {
             step
         };
         let periods = (0..used.len()).map(&mut period).collect();
-        Self { periods, used: used.to_vec(), logarithms }
+        Self { periods, logarithms }
     }
 
     /// Whitened innovations, a row for each component of each used period: of the record, of its change where the base moved more than it read, over the
     /// share of it, and of a unit of the real and of the imaginary part of each unknown.
     pub fn whiten(&self, record: &Record, columns: &Columns) -> DMatrix<f64> {
         let unknowns = columns.direct[0].len() - 1;
-        let rows = 2 * self.used.iter().filter(|used| **used).count();
-        let mut state = vec![Vector2::zeros(); 2 + 2 * unknowns];
-        let mut white = DMatrix::zeros(2 + 2 * unknowns, rows);
-        let mut row = 0;
         let linear = &record.periods.linear;
-        for (k, period) in self.periods.iter().enumerate() {
-            let (increments, direct, before) = (&columns.increments[k], &columns.direct[k], k.saturating_sub(1));
+        let acts = |k: usize, row: usize| {
+            let (both, before) = ([&columns.increments[k], &columns.direct[k]], k.saturating_sub(1));
             let fed_back = |path: Complex64| columns.feedback[k] * pair(path);
-            for (n, x) in state.iter_mut().enumerate() {
-                let of_unknown = |unit: Complex64| [increments, direct].map(|of| pair(unit * of[n / 2]));
-                let [increment, direct] = match n {
-                    0 => [
-                        pair(increments[0]) - fed_back(columns.path[before]),
-                        pair(direct[0] - record.departure[k]),
-                    ],
-                    1 => [-fed_back(linear[before]), -pair(linear[k])],
-                    _ if n % 2 == 0 => of_unknown(Complex64::ONE),
-                    _ => of_unknown(Complex64::i()),
-                };
-                let [_, innovation] = period.advance(x, increment, direct);
-                if self.used[k] {
-                    white.fixed_view_mut::<1, 2>(n, row).copy_from(&innovation.transpose());
+            let of_unknown = |unit: Complex64| both.map(|of| pair(unit * of[row / 2]));
+            match row {
+                0 => {
+                    let [increment, direct] = both.map(|of| of[0]);
+                    let fed_back = fed_back(columns.path[before]);
+                    [pair(increment) - fed_back, pair(direct - record.departure[k])]
                 }
+                1 => [-fed_back(linear[before]), -pair(linear[k])],
+                _ if row % 2 == 0 => of_unknown(Complex64::ONE),
+                _ => of_unknown(Complex64::i()),
             }
-            row += if self.used[k] { 2 } else { 0 };
-        }
+        };
+        let mut white = whiten(&self.periods, 2 + 2 * unknowns, acts);
         white.rows_mut(0, 2).neg_mut();
         white
     }
@@ -164,18 +184,14 @@ impl Filter {
             row[0] + row[1..].iter().zip(unknowns).map(|(a, b)| a * b).sum::<Complex64>()
         };
         let direct: Vec<Complex64> = columns.direct.iter().map(|row| sum(row)).collect();
-        let mut state = Vector2::zeros();
-        let mut states = Vec::new();
-        for (k, step) in self.periods.iter().enumerate() {
-            let known =
-                pair(sum(&columns.increments[k])) - columns.feedback[k] * pair(columns.path[k.saturating_sub(1)]);
-            let [predicted, _] = step.advance(&mut state, known, pair(direct[k] - record.departure[k]));
-            states.push([predicted, state]);
-        }
-        let steps: Vec<&Step> = self.periods.iter().collect();
+        let acts = |k: usize| {
+            let fed_back = columns.feedback[k] * pair(columns.path[k.saturating_sub(1)]);
+            let increment = pair(sum(&columns.increments[k])) - fed_back;
+            [increment, pair(direct[k] - record.departure[k])]
+        };
         let mut response = record.periods.response.clone();
-        for (k, state) in smooth(&steps, &states).into_iter().enumerate() {
-            if self.used[k] {
+        for (k, state) in smooth(&self.periods, acts).into_iter().enumerate() {
+            if self.periods[k].is_used {
                 response[k] = record.periods.linear[k] + Complex64::new(state[0], state[1]) + direct[k];
             }
         }

@@ -12,10 +12,10 @@
 //! on the true path: `g X/z` has another value there. A Kalman filter over periods whitens both against noise of response and drive, and least
 //! squares gives the unknowns with their covariance. A second pass runs along the path without the rings, with the slope of the first one.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2};
 use num_complex::Complex64;
 
-use crate::filter::{Step, pair, rotation, smooth};
+use crate::filter::{Step, pair, rotation, smooth, whiten};
 
 /// Periods of a motion, of about one amplitude.
 #[derive(Debug, Clone)]
@@ -81,12 +81,10 @@ const FORCE: usize = 2;
 const SLOPES: usize = 4;
 const LAG: usize = 6;
 
-/// How an unknown acts.
+/// How an unknown, or what is known, acts.
 struct Column {
-    /// On the logarithm, from the period before to each period; on the first one as well.
-    increments: Vec<Complex64>,
-    /// On the measured logarithm alone.
-    direct: Option<Vec<Complex64>>,
+    /// On the logarithm, from the period before to each period, on the first one as well; and on the measured logarithm alone.
+    acts: Vec<[Complex64; 2]>,
     /// Expected value and its standard deviation.
     expected: [f64; 2],
 }
@@ -105,47 +103,47 @@ struct Assumed {
     lag: f64,
 }
 
+impl Assumed {
+    /// Along this path; `None` where a ring would be larger than the response.
+    fn along(motion: &Motion, path: Vec<Complex64>, slope: [[f64; 2]; 2], lag: f64) -> Option<Self> {
+        let apart: Vec<Complex64> = motion
+            .response
+            .iter()
+            .zip(&path)
+            .map(|(z, path)| (z - path).exp())
+            .collect();
+        let mean = mean_amplitude(&path);
+        let is_near = apart.iter().all(|apart| (1.0 / apart - 1.0).norm() <= RING);
+        is_near.then(|| Self {
+            changes: path.iter().map(|z| z.re - mean).collect(),
+            drive: motion
+                .drive
+                .iter()
+                .zip(&apart)
+                .map(|(rate, apart)| rate * apart)
+                .collect(),
+            measured: apart.iter().map(|apart| apart - 1.0).collect(),
+            path,
+            slope,
+            lag,
+        })
+    }
+}
+
 impl Level {
     /// From periods; `None` for fewer than three, or where the unknowns cannot be told apart.
     pub fn of(motion: &Motion) -> Option<Self> {
         let size = motion.drive.iter().map(|rate| rate.norm()).sum::<f64>() / motion.drive.len() as f64;
         let slope = motion.slope.unwrap_or([[0.0, SLOPE * size]; 2]);
+        // Noise of the response would look like a change of the force.
         let first = Assumed {
-            path: motion.response.clone(),
-            measured: vec![Complex64::ZERO; motion.response.len()],
-            // Noise of the response would look like a change of the force.
             changes: vec![0.0; motion.response.len()],
-            drive: motion.drive.clone(),
-            slope,
-            lag: SLOPE * size * motion.lag,
+            ..Assumed::along(motion, motion.response.clone(), slope, SLOPE * size * motion.lag)?
         };
         let (mut level, mut path) = Self::pass(motion, &first)?;
         for _ in 0..REPEATED {
-            let apart: Vec<Complex64> = motion
-                .response
-                .iter()
-                .zip(&path)
-                .map(|(z, path)| (z - path).exp())
-                .collect();
-            // No ring is larger than the response.
-            if apart.iter().any(|apart| (1.0 / apart - 1.0).norm() > RING) {
-                return None;
-            }
             let largest = [SLOPES, SLOPES + 1].map(|i| level.unknowns[i].hypot(level.covariance[(i, i)].sqrt()));
-            let mean = mean_amplitude(&path);
-            let assumed = Assumed {
-                changes: path.iter().map(|z| z.re - mean).collect(),
-                drive: motion
-                    .drive
-                    .iter()
-                    .zip(&apart)
-                    .map(|(rate, apart)| rate * apart)
-                    .collect(),
-                measured: apart.iter().map(|apart| apart - 1.0).collect(),
-                path,
-                slope,
-                lag: largest[0].hypot(largest[1]) * motion.lag,
-            };
+            let assumed = Assumed::along(motion, path, slope, largest[0].hypot(largest[1]) * motion.lag)?;
             (level, path) = Self::pass(motion, &assumed)?;
         }
         Some(level)
@@ -157,32 +155,13 @@ impl Level {
         let amplitude = mean_amplitude(&assumed.path);
         let columns = columns(motion, assumed, amplitude);
         let n = columns.len();
-        let steps = steps(motion, assumed);
-        let known = integrals(&motion.time, &assumed.drive);
-        let mut white = DMatrix::zeros(1 + n, 2 * count);
-        let mut states = DMatrix::zeros(2, 1 + n);
-        let mut history = Vec::new();
-        for (k, (step, implicit)) in steps.iter().enumerate() {
-            let before = assumed.path[k.saturating_sub(1)];
-            let mut predicted = DMatrix::zeros(2, 1 + n);
-            for j in 0..=n {
-                let (increment, direct) = match j.checked_sub(1).map(|j| &columns[j]) {
-                    None => (known[k] + before - assumed.path[k], -assumed.measured[k]),
-                    Some(column) => {
-                        let direct = column.direct.as_ref().map_or(Complex64::ZERO, |of| of[k]);
-                        (column.increments[k], direct)
-                    }
-                };
-                let mut state = states.fixed_view::<2, 1>(0, j).into_owned();
-                let [ahead, innovation] = step.advance(&mut state, implicit * pair(increment), pair(direct));
-                states.set_column(j, &state);
-                predicted.set_column(j, &ahead);
-                white
-                    .fixed_view_mut::<1, 2>(j, 2 * k)
-                    .copy_from(&innovation.transpose());
-            }
-            history.push([predicted, states.clone()]);
-        }
+        let (steps, implicit): (Vec<Step>, Vec<_>) = steps(motion, assumed).into_iter().unzip();
+        let before = |k: usize| assumed.path[k.saturating_sub(1)] - assumed.path[k];
+        let driven = integrals(&motion.time, &assumed.drive).into_iter().enumerate();
+        let known: Vec<_> = driven.map(|(k, by)| [by + before(k), -assumed.measured[k]]).collect();
+        let acts = |k: usize, [increment, direct]: [Complex64; 2]| [implicit[k] * pair(increment), pair(direct)];
+        let of_row = |k: usize, row: usize| row.checked_sub(1).map_or(known[k], |j| columns[j].acts[k]);
+        let white = whiten(&steps, 1 + n, |k, row| acts(k, of_row(k, row)));
         // Columns of very different size make the equations ill-conditioned; with a diagonal of 1 they are not.
         let products = &white * white.transpose();
         let information = |j: usize| columns[j].expected[1].powi(-2);
@@ -201,11 +180,11 @@ impl Level {
         let free = columns.iter().filter(|column| column.expected[1].is_infinite()).count();
         let degrees = (2 * count).checked_sub(free).filter(|degrees| *degrees > 0)?;
         let sum = innovations.norm_squared() + of_priors.sum::<f64>();
-        let weights = unknowns.clone().insert_row(0, 1.0);
-        let found = |of: &DMatrix<f64>| Vector2::from_iterator((of * &weights).iter().copied());
-        let history: Vec<_> = history.iter().map(|states| [0, 1].map(|i| found(&states[i]))).collect();
-        let steps: Vec<&Step> = steps.iter().map(|(step, _)| step).collect();
-        let moved = smooth(&steps, &history);
+        let whole = |k: usize| {
+            let with = |sum: [Complex64; 2], j: usize| [0, 1].map(|i| sum[i] + columns[j].acts[k][i] * unknowns[j]);
+            (0..n).fold(known[k], with)
+        };
+        let moved = smooth(&steps, |k| acts(k, whole(k)));
         let path = assumed
             .path
             .iter()
@@ -287,11 +266,6 @@ fn mean_amplitude(path: &[Complex64]) -> f64 {
     path.iter().map(|z| z.re).sum::<f64>() / path.len() as f64
 }
 
-/// A ring of amplitude one, over the mean amplitude, at a period.
-fn ring(motion: &Motion, pole: Complex64, k: usize) -> Complex64 {
-    (pole * (motion.time[k] - motion.time[0])).exp()
-}
-
 /// Integrals of rates from each period to the next one, and 0 up to the first: the drive of a period is constant.
 fn integrals(time: &[f64], rates: &[Complex64]) -> Vec<Complex64> {
     let step = |k: usize| 0.5 * (time[k] - time[k - 1]) * (rates[k - 1] + rates[k]);
@@ -305,34 +279,32 @@ fn columns(motion: &Motion, assumed: &Assumed, amplitude: f64) -> Vec<Column> {
     const NONE: [[f64; 2]; 2] = [[0.0, f64::INFINITY]; 2];
     let (count, time) = (motion.time.len(), &motion.time);
     let changes: Vec<Complex64> = assumed.changes.iter().map(|change| (*change).into()).collect();
-    let start = (0..count).map(|k| if k == 0 { Complex64::ONE } else { Complex64::ZERO });
-    let steps = (0..count).map(|k| changes[k] - changes[k.saturating_sub(1)]);
     let mut columns = Vec::new();
-    let mut complex = |increments: Vec<Complex64>, direct: Option<Vec<Complex64>>, expected: [[f64; 2]; 2]| {
+    let mut complex = |acts: &dyn Fn(usize) -> [Complex64; 2], expected: [[f64; 2]; 2]| {
         for (part, expected) in [Complex64::ONE, Complex64::i()].into_iter().zip(expected) {
-            let turned = |values: &Vec<Complex64>| values.iter().map(|value| part * value).collect();
-            let (increments, direct) = (turned(&increments), direct.as_ref().map(turned));
-            columns.push(Column { increments, direct, expected });
+            let acts = (0..count).map(|k| acts(k).map(|of| part * of)).collect();
+            columns.push(Column { acts, expected });
         }
     };
-    complex(start.collect(), None, NONE);
-    complex(integrals(time, &vec![Complex64::ONE; count]), None, NONE);
-    complex(integrals(time, &changes), None, assumed.slope);
+    let [constant, changing] = [vec![Complex64::ONE; count], changes.clone()].map(|rates| integrals(time, &rates));
+    complex(
+        &|k| [if k == 0 { Complex64::ONE } else { Complex64::ZERO }, Complex64::ZERO],
+        NONE,
+    );
+    complex(&|k| [constant[k], Complex64::ZERO], NONE);
+    complex(&|k| [changing[k], Complex64::ZERO], assumed.slope);
     if assumed.lag > 0.0 {
-        complex(steps.collect(), None, [[0.0, assumed.lag]; 2]);
+        let step = |k: usize| changes[k] - changes[k.saturating_sub(1)];
+        complex(&|k| [step(k), Complex64::ZERO], [[0.0, assumed.lag]; 2]);
     }
     for pole in &motion.rings {
-        let ring = |k: usize| ring(motion, *pole, k) * (amplitude - assumed.path[k]).exp();
-        complex(
-            vec![Complex64::ZERO; count],
-            Some((0..count).map(ring).collect()),
-            [[0.0, RING]; 2],
-        );
+        // Of amplitude one over the mean amplitude.
+        let ring = |k: usize| (pole * (time[k] - time[0]) + amplitude - assumed.path[k]).exp();
+        complex(&|k| [Complex64::ZERO, ring(k)], [[0.0, RING]; 2]);
     }
-    columns.extend(motion.disturbances.iter().map(|one| Column {
-        increments: integrals(time, &one.rates),
-        direct: None,
-        expected: [0.0, one.deviation],
+    columns.extend(motion.disturbances.iter().map(|one| {
+        let acts = integrals(time, &one.rates).into_iter().map(|by| [by, Complex64::ZERO]);
+        Column { acts: acts.collect(), expected: [0.0, one.deviation] }
     }));
     columns
 }
