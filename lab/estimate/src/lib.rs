@@ -18,6 +18,7 @@ mod columns;
 mod curve;
 mod filter;
 mod fit;
+mod harmonics;
 mod interpolation;
 mod level;
 mod linear;
@@ -29,6 +30,7 @@ mod windows;
 
 pub use curve::{Backbone, Curve, Resonance};
 pub use fit::{Estimate, Hyper, Solution};
+pub use harmonics::{HarmonicBasis, HarmonicFit, transform};
 pub use interpolation::{Basis, CubicSpline};
 pub use level::{Disturbance, Level, Motion};
 pub use linear::Linear;

@@ -10,6 +10,8 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use crate::harmonics::{Projection, transform};
+
 /// Oscillations that explain some samples best.
 #[derive(Debug, Clone)]
 pub struct Oscillations {
@@ -55,21 +57,12 @@ impl Samples<'_> {
         columns
     }
 
-    /// Least squares with these columns: the unknowns and what they leave. NaN where the columns do not determine them.
-    fn solve(columns: &DMatrix<f64>, values: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
-        let factors = columns.clone().qr();
-        let mut right = values.clone();
-        factors.q_tr_mul(&mut right);
-        let right = right.rows(0, columns.ncols()).into_owned();
-        let unknowns = factors.r().solve_upper_triangular(&right);
-        let unknowns = unknowns.unwrap_or_else(|| DVector::from_element(columns.ncols(), f64::NAN));
-        let rest = values - columns * &unknowns;
-        (unknowns, rest)
-    }
-
     /// The best oscillations with this pole.
     fn at(&self, pole: Complex64) -> Oscillations {
-        let (unknowns, rest) = Self::solve(&self.columns(pole, None), &self.values);
+        let columns = Projection::new(self.columns(pole, None));
+        let nothing =
+            || [3 + self.trend + 2 * self.known.len(), self.times.len()].map(|n| DVector::from_element(n, f64::NAN));
+        let [unknowns, rest] = columns.fit(&self.values).unwrap_or_else(nothing);
         let pairs = unknowns.as_slice()[self.trend + 1..].chunks_exact(2);
         let amplitudes = pairs.map(|pair| Complex64::new(pair[0], pair[1])).collect();
         let (covariance, trend) = (DMatrix::zeros(0, 0), self.trend);
@@ -96,9 +89,11 @@ impl Oscillations {
         let turned = |n: i32| samples.at(start + Complex64::new(0.0, f64::from(n) * quarter));
         let most = (range * start.im / quarter) as i32;
         let mut best = (-most..=most).map(turned).fold(turned(0), better);
-        let columns = |best: &Self| samples.columns(best.pole, best.amplitudes.last().copied());
+        let columns = |best: &Self| Projection::new(samples.columns(best.pole, best.amplitudes.last().copied()));
         for _ in 0..STEPS {
-            let (change, _) = Samples::solve(&columns(&best), &best.rest);
+            let Some([change, _]) = columns(&best).fit(&best.rest) else {
+                break;
+            };
             let n = change.len();
             let next = samples.at(best.pole + Complex64::new(change[n - 2], change[n - 1]));
             if next.error() < best.error() {
@@ -107,9 +102,8 @@ impl Oscillations {
                 break;
             }
         }
-        let factors = columns(&best).qr();
-        let n = factors.r().ncols();
-        let inverse = factors.r().solve_upper_triangular(&DMatrix::identity(n, n));
+        let n = trend + 5 + 2 * known.len();
+        let inverse = columns(&best).inverse();
         best.covariance = inverse.map_or(DMatrix::from_element(n, n, f64::NAN), |r| &r * r.transpose());
         best
     }
@@ -137,13 +131,7 @@ impl Oscillations {
         let blocks = self.rest.as_slice().chunks_exact(block);
         // As many complex unknowns as amplitudes, and the pole.
         let degrees = blocks.len() as f64 - self.amplitudes.len() as f64 - 1.0;
-        let in_band = |values: &[f64]| {
-            let terms = values.iter().enumerate();
-            terms
-                .map(|(n, value)| Complex64::cis(-turn * n as f64) * value)
-                .sum::<Complex64>()
-                .norm_sqr()
-        };
+        let in_band = |values: &[f64]| transform(values, turn).norm_sqr();
         blocks.map(in_band).sum::<f64>() / (block as f64 * degrees)
     }
 }

@@ -1,10 +1,12 @@
 //! The fundamental of a record, period by period.
 
 use std::f64::consts::{LN_2, PI, TAU};
+use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::DVector;
 use num_complex::Complex64;
 
+use crate::harmonics::{HarmonicBasis, HarmonicFit};
 use crate::interpolation::{CubicSpline, curvature, gradient, unwrapped};
 use crate::level::SURE;
 
@@ -35,52 +37,34 @@ const SAMPLES: usize = 5;
 
 /// The least-squares fit of harmonics to a period.
 struct Fit {
-    begin: usize,
-    matrix: DMatrix<f64>,
-    factors: Cholesky<f64, Dyn>,
+    samples: Range<usize>,
+    basis: HarmonicBasis,
 }
 
 impl Fit {
-    /// For the samples from `begin` to `end` at the frequency `omega`.
-    fn new([begin, end]: [usize; 2], step: f64) -> Option<Self> {
-        let n = end - begin;
+    /// For these samples, `step` rad apart.
+    fn new(samples: Range<usize>, step: f64) -> Self {
+        let n = samples.len();
         let middle = 0.5 * (n - 1) as f64;
-        let terms = 1 + 2 * HARMONICS.min(n / SAMPLES);
-        let mut matrix = DMatrix::zeros(n, terms);
-        for row in 0..n {
-            let turn = Complex64::cis((row as f64 - middle) * step);
-            let mut harmonic = Complex64::ONE;
-            matrix[(row, 0)] = 1.0;
-            for order in 1..=terms / 2 {
-                harmonic *= turn;
-                matrix[(row, 2 * order - 1)] = harmonic.im;
-                matrix[(row, 2 * order)] = harmonic.re;
-            }
-        }
-        let factors = matrix.tr_mul(&matrix).cholesky()?;
-        Some(Self { begin, matrix, factors })
+        let phases: Vec<f64> = (0..n).map(|k| (k as f64 - middle) * step).collect();
+        let basis = HarmonicBasis::new(&phases, 0, &vec![Some(0); HARMONICS.min(n / SAMPLES)]);
+        Self { samples, basis }
     }
 
-    /// Coefficients, and the variance of a component by what they leave.
-    fn of(&self, signal: &[f64]) -> (DVector<f64>, f64) {
-        let n = self.matrix.nrows();
-        let values = DVector::from_column_slice(&signal[self.begin..self.begin + n]);
-        let coefficients = self.factors.solve(&self.matrix.tr_mul(&values));
-        let rest = (values - &self.matrix * &coefficients).norm_squared();
-        let free = (n - self.matrix.ncols()) as f64;
-        (coefficients, rest / free * 2.0 / n as f64)
+    fn of(&self, signal: &[f64]) -> Option<HarmonicFit> {
+        self.basis
+            .fit(&DVector::from_column_slice(&signal[self.samples.clone()]))
     }
 
     /// Variance of a component by white noise, from the median of the sixth differences: impulses are not noise.
     fn white(&self, signal: &[f64]) -> f64 {
-        let n = self.matrix.nrows();
         let sixth = |v: &[f64]| (20.0 * v[3] - 15.0 * (v[2] + v[4]) + 6.0 * (v[1] + v[5]) - (v[0] + v[6])).abs();
-        let mut sizes: Vec<f64> = signal[self.begin..self.begin + n].windows(7).map(sixth).collect();
+        let mut sizes: Vec<f64> = signal[self.samples.clone()].windows(7).map(sixth).collect();
         sizes.sort_by(f64::total_cmp);
         let m = sizes.len();
         let median = 0.5 * (sizes[(m - 1) / 2] + sizes[m / 2]);
         // Median of the size of a normal variable; sum of the squares of the factors.
-        (median / 0.6745).powi(2) / 924.0 * 2.0 / n as f64
+        (median / 0.6745).powi(2) / 924.0 * 2.0 / self.samples.len() as f64
     }
 }
 
@@ -89,9 +73,9 @@ fn mean(of: &[f64]) -> f64 {
 }
 
 /// The second harmonic in a fit, if it contains one.
-fn second(coefficients: &DVector<f64>) -> Complex64 {
-    match coefficients.len() > 4 {
-        true => Complex64::new(coefficients[3], coefficients[4]),
+fn second(fit: &HarmonicFit) -> Complex64 {
+    match fit.harmonics() > 1 {
+        true => fit.harmonic(2),
         false => Complex64::ZERO,
     }
 }
@@ -183,21 +167,22 @@ impl Periods {
         }
         let turns = turns(response, step);
         let edges = edges(&turns, width);
-        let spans: Vec<[usize; 2]> = edges.windows(2).map(|pair| [pair[0], pair[1]]).collect();
-        if spans.len() < 12 {
+        if edges.len() < 13 {
             return None;
         }
         let mut periods = Self::default();
         let (mut fits, mut phases) = (Vec::new(), Vec::new());
-        for span @ [i, j] in spans {
+        for pair in edges.windows(2) {
+            let [i, j] = [pair[0], pair[1]];
             let turn_per_sample = (turns[j] - turns[i]) / (j - i) as f64;
-            fits.push(Fit::new(span, TAU * turn_per_sample)?);
+            fits.push(Fit::new(i..j, TAU * turn_per_sample));
             phases.push(Complex64::cis(TAU * 0.5 * (turns[i] + turns[j - 1])));
             periods.omega.push(TAU * turn_per_sample / sample_time);
             periods.time.push((i as f64 + 0.5 * (j - i - 1) as f64) * sample_time);
         }
-        [periods.response, periods.linear, periods.base] =
+        let [response_of, linear_of, base_of] =
             [response, linear, base].map(|signal| periods.smooth(&fits, &phases, signal, omega));
+        (periods.response, periods.linear, periods.base) = (response_of?, linear_of?, base_of?);
         let envelope = CubicSpline::new(periods.time.clone(), periods.response.clone());
         let mut rest = response.to_vec();
         for (k, value) in rest.iter_mut().enumerate().take(edges[edges.len() - 1]).skip(edges[0]) {
@@ -207,11 +192,12 @@ impl Periods {
         let (mut seconds, mut whites) = (Vec::new(), Vec::new());
         let is_displacement = readings[0] == response;
         for fit in &fits {
-            let (coefficients, noise) = fit.of(&rest);
-            periods.second.push(second(&coefficients));
+            let of_rest = fit.of(&rest)?;
+            let noise = of_rest.noise * 2.0 / fit.samples.len() as f64;
+            periods.second.push(second(&of_rest));
             seconds.push(match is_displacement {
-                true => second(&coefficients),
-                false => second(&fit.of(readings[0]).0),
+                true => second(&of_rest),
+                false => second(&fit.of(readings[0])?),
             });
             // What is left of an integral has not the noise of its sensor.
             let [white, of_base] = readings.map(|reading| fit.white(reading));
@@ -231,12 +217,9 @@ impl Periods {
 
     /// Fundamental of a signal, without what its drift leaves in it. Drift is that in the frame of the response, whose phases in the middles of the
     /// periods are given: in a frame of constant frequency differences would miss a part of the detuning.
-    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], omega: f64) -> Vec<Complex64> {
-        let one = |(fit, phase): (&Fit, &Complex64)| {
-            let coefficients = fit.of(signal).0;
-            Complex64::new(coefficients[1], coefficients[2]) * phase.conj()
-        };
-        let z: Vec<Complex64> = fits.iter().zip(phases).map(one).collect();
+    fn smooth(&self, fits: &[Fit], phases: &[Complex64], signal: &[f64], omega: f64) -> Option<Vec<Complex64>> {
+        let one = |(fit, phase): (&Fit, &Complex64)| Some(fit.of(signal)?.harmonic(1) * phase.conj());
+        let z: Vec<Complex64> = fits.iter().zip(phases).map(one).collect::<Option<_>>()?;
         let rates = gradient(&z, &self.time);
         let curvatures = curvature(&z, &self.time);
         let corrected = |k: usize| {
@@ -246,6 +229,6 @@ impl Periods {
                 - (curvature * (PI * PI / 6.0) - curvature.conj() / 4.0) / (omega_k * omega_k);
             own * Complex64::cis(-omega * self.time[k])
         };
-        (0..z.len()).map(corrected).collect()
+        Some((0..z.len()).map(corrected).collect())
     }
 }

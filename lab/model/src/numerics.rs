@@ -4,9 +4,7 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nalgebra::{
-    Complex, Const, DMatrix, DVector, DimMin, Dyn, RowSVector, SMatrix, SVector, linalg::QR, linalg::Schur,
-};
+use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, RowSVector, SMatrix, SVector, linalg::Schur};
 
 /// Standard errors from which on a difference is not noise: 0.3 % of normal noise is beyond.
 pub const SIGNIFICANT: f64 = 3.0;
@@ -448,117 +446,6 @@ fn squares(values: &[f64]) -> Option<f64> {
     sum.is_finite().then_some(sum)
 }
 
-/// Basis functions at given phases: a polynomial, and harmonics whose amplitudes are polynomials in time.
-///
-/// Time runs from -1 at the first sample to 1 at the last. The factors serve any number of signals.
-pub struct HarmonicBasis {
-    matrix: DMatrix<f64>,
-    factors: QR<f64, Dyn, Dyn>,
-    /// Column of each harmonic's constant part.
-    columns: Vec<usize>,
-}
-
-/// The coefficients of a signal in such a basis.
-pub struct HarmonicFit {
-    coefficients: DVector<f64>,
-    columns: Vec<usize>,
-}
-
-impl HarmonicBasis {
-    /// The basis at the `phases` (rad) of the fundamental: a polynomial of degree `trend`, and each of the harmonics 1, 2, …
-    /// of `harmonics` that is given with the degree of its amplitude; `None` leaves one out.
-    pub fn new(phases: &[f64], trend: usize, harmonics: &[Option<usize>]) -> Self {
-        let last = (phases.len().max(2) - 1) as f64;
-        let time = |row: usize| 2.0 * row as f64 / last - 1.0;
-        let mut terms: Vec<(usize, usize, bool)> = (0..=trend).map(|degree| (0, degree, true)).collect();
-        let mut columns = Vec::new();
-        for (n, degree) in harmonics.iter().enumerate() {
-            columns.push(terms.len());
-            for degree in degree.map_or(0..0, |degree| 0..degree + 1) {
-                terms.extend([(n + 1, degree, false), (n + 1, degree, true)]);
-            }
-        }
-        let matrix = DMatrix::from_fn(phases.len(), terms.len(), |row, column| {
-            let (harmonic, degree, cosine) = terms[column];
-            let angle = harmonic as f64 * phases[row];
-            let wave = if cosine { angle.cos() } else { angle.sin() };
-            time(row).powi(degree as i32) * wave
-        });
-        Self { factors: matrix.clone().qr(), matrix, columns }
-    }
-
-    /// With rows weighted by these; values are to be weighted alike.
-    #[must_use]
-    pub fn weighted(mut self, weights: &DVector<f64>) -> Self {
-        for mut column in self.matrix.column_iter_mut() {
-            column.component_mul_assign(weights);
-        }
-        Self { factors: self.matrix.clone().qr(), ..self }
-    }
-
-    /// Number of unknowns.
-    pub fn terms(&self) -> usize {
-        self.matrix.ncols()
-    }
-
-    /// The best fit of `values`, one for each phase; `None` for fewer values than unknowns, or phases for which the
-    /// terms are not independent.
-    pub fn fit(&self, values: &DVector<f64>) -> Option<HarmonicFit> {
-        if self.matrix.nrows() < self.terms() {
-            return None;
-        }
-        let mut right = values.clone();
-        self.factors.q_tr_mul(&mut right);
-        let right = right.rows(0, self.terms()).into_owned();
-        let coefficients = self.factors.r().solve_upper_triangular(&right)?;
-        Some(HarmonicFit { coefficients, columns: self.columns.clone() })
-    }
-
-    /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with white noise of variance 1 before they are weighted, if
-    /// they are, by `weights`; NaN where the terms are not independent. `harmonic` counts from 1.
-    pub fn variances(&self, harmonic: usize, degree: usize, weights: Option<&DVector<f64>>) -> [f64; 2] {
-        let column = self.columns[harmonic - 1] + 2 * degree;
-        let identity = DMatrix::identity(self.terms(), self.terms());
-        let Some(inverse) = self.factors.r().solve_upper_triangular(&identity) else {
-            return [f64::NAN; 2];
-        };
-        let variance = |row: usize| match weights {
-            None => inverse.row(row).norm_squared(),
-            // Q is the matrix times the inverse of R.
-            Some(weights) => (&self.matrix * (&inverse * inverse.row(row).transpose()))
-                .component_mul(weights)
-                .norm_squared(),
-        };
-        [column, column + 1].map(variance)
-    }
-
-    /// The residual of a fit, weighted as the rows are.
-    pub fn residual(&self, values: &DVector<f64>, fit: &HarmonicFit) -> DVector<f64> {
-        values - &self.matrix * &fit.coefficients
-    }
-}
-
-impl HarmonicFit {
-    /// Number of harmonics.
-    pub fn harmonics(&self) -> usize {
-        self.columns.len()
-    }
-
-    /// Complex amplitude a of a harmonic in the middle: `Im(a exp(i n phase))`. `harmonic` counts from 1.
-    pub fn harmonic(&self, harmonic: usize) -> Complex<f64> {
-        self.pair(self.columns[harmonic - 1])
-    }
-
-    /// Change of that amplitude per half of the window; the basis has it where the harmonic's degree is at least 1.
-    pub fn drift(&self, harmonic: usize) -> Complex<f64> {
-        self.pair(self.columns[harmonic - 1] + 2)
-    }
-
-    fn pair(&self, column: usize) -> Complex<f64> {
-        Complex::new(self.coefficients[column], self.coefficients[column + 1])
-    }
-}
-
 /// A value and its standard uncertainty: the value ± 1.96 uncertainties is a 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
@@ -644,27 +531,6 @@ mod tests {
         let rough = (0..200).map(|n| cubic(n) + 0.1 * f64::from(1 - 2 * (n as i32 % 2)));
         assert!((noise(&rough.collect::<Vec<_>>()) - 0.8 / 20f64.sqrt()).abs() < 1e-9);
         assert_eq!(noise(&[1.0; 5]), 0.0);
-    }
-
-    #[test]
-    fn amplitudes_and_drift_are_found_to_rounding() {
-        let phases: Vec<f64> = (0..150).map(|n| 0.1 * f64::from(n)).collect();
-        let values = phases.iter().map(|phase| {
-            let t = phase / 7.45 - 1.0;
-            0.3 + (0.7 + 0.1 * t) * phase.sin() - 0.2 * phase.cos() + 0.05 * (3.0 * phase + 0.4).sin()
-        });
-        let values = DVector::from_iterator(150, values);
-        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(0)]);
-        let fit = basis.fit(&values).unwrap();
-        assert!((fit.harmonic(1) - Complex::new(0.7, -0.2)).norm() < 1e-14);
-        assert!((fit.drift(1) - Complex::new(0.1, 0.0)).norm() < 1e-14);
-        assert!((fit.harmonic(3) - Complex::from_polar(0.05, 0.4)).norm() < 1e-14);
-        assert!(basis.residual(&values, &fit).norm() < 1e-13);
-        // Too few or equal phases give no fit.
-        for phases in [&[0.0, 0.1][..], &[0.0; 20]] {
-            let basis = HarmonicBasis::new(phases, 0, &[Some(0)]);
-            assert!(basis.fit(&DVector::zeros(phases.len())).is_none());
-        }
     }
 
     #[test]

@@ -7,12 +7,13 @@ pub use regimes::regimes;
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
+use vines_estimate::HarmonicBasis;
 
 use super::figure::{Figure, Marked, Panel, Place, Shape};
 use super::theme::{EXACT, INK, MEASURED, PARTICLE, PREDICTED, THEORY};
 use crate::comparison::{Comparison, ExactCurve, TrackedComparison};
 use crate::fit::{Found, MeasuredPoint};
-use crate::numerics::{Estimate, HarmonicBasis, equally_spaced, range};
+use crate::numerics::{Estimate, equally_spaced, range};
 use crate::orbit::{StructureBranch, StructureOrbit};
 use crate::record::Record;
 use crate::scene::{Dimensionless, Scene, Sensor};

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use num_complex::Complex64;
 use serde::Serialize;
-use vines_estimate::Oscillations;
+use vines_estimate::{HarmonicBasis, Oscillations};
 use vines_identify::{IdealRig, Identified, MOTIONS, MeasuredCurve, Samples, Signals, Unidentified, identify};
-use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, range};
+use vines_model::numerics::{SIGNIFICANT, mean, range};
 use vines_model::{ArgumentError, Measurand, Sensor};
 use vines_scene::knowledge::{Knowledge, Target};
 use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, ParticleState};
@@ -262,9 +262,8 @@ impl Recording {
         let fundamental = |(n, values): (usize, &[f64])| {
             let values = DVector::from_column_slice(values);
             let fit = basis.fit(&values)?;
-            let rest = basis.residual(&values, &fit).norm_squared() / (period - basis.terms()) as f64;
             let phase = Complex64::cis(-turn * (n * period) as f64);
-            let noise = rest * unit.norm_sqr() * 2.0 / period as f64;
+            let noise = fit.noise * unit.norm_sqr() * 2.0 / period as f64;
             Some(Fundamental { value: fit.harmonic(1) * unit * phase, noise })
         };
         let values = [&self.response, &self.drive][channel];

@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DVector};
-use vines_model::numerics::{HarmonicBasis, mean};
+use vines_estimate::HarmonicBasis;
+use vines_model::numerics::mean;
 
 use super::{HARMONICS, most_harmonics};
 use crate::record::{Sample, drive_phases};
@@ -57,8 +58,7 @@ impl Bases {
     /// fundamental, over its mean.
     fn harmonics(&self, values: &DVector<f64>, coloured: f64) -> Option<([Complex<f64>; 2], f64)> {
         let fit = self.basis.fit(values)?;
-        let residual = self.drifting.residual(values, &self.drifting.fit(values)?);
-        let variance = residual.norm_squared() / (values.len() - self.drifting.terms()) as f64;
+        let variance = self.drifting.fit(values)?.noise;
         let harmonics = [1, 2].map(|n| fit.harmonic(n));
         Some((harmonics, variance * coloured * 2.0 / values.len() as f64))
     }

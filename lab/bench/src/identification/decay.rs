@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use nalgebra::DVector;
 use serde::Serialize;
-use vines_model::numerics::{Estimate, HarmonicBasis, SIGNIFICANT, mean};
+use vines_estimate::HarmonicBasis;
+use vines_model::numerics::{Estimate, SIGNIFICANT, mean};
 use vines_model::regime::end_of_synchrony;
 
 use super::response::impacts;
@@ -181,8 +182,8 @@ pub(crate) fn base_at_rest(record: &Record, knowledge: &Knowledge) -> Result<usi
         let Some(fit) = basis.fit(&values).filter(|_| period > basis.terms()) else {
             break;
         };
-        let variance = basis.residual(&values, &fit).norm_squared() / (period - basis.terms()) as f64;
-        let variance = variance.max((LEAST_NOISE * values.amax()).powi(2)) * target.colour_of_fundamental(omega, dt, 1);
+        let variance =
+            fit.noise.max((LEAST_NOISE * values.amax()).powi(2)) * target.colour_of_fundamental(omega, dt, 1);
         let uncertainty = displacement * (2.0 * variance / period as f64).sqrt();
         let value = displacement * fit.harmonic(1).norm();
         if value <= SIGNIFICANT * uncertainty {
@@ -283,9 +284,9 @@ impl Harmonic {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Terms {
     /// Degree of the trend.
-    trend: usize,
+    trend: i32,
     /// Degrees of the harmonics.
-    harmonics: &'static [Option<usize>],
+    harmonics: &'static [Option<i32>],
     /// Whether residuals have the weights of Hann's window, in which what is not fitted leaks least into the fundamental.
     is_hann: bool,
     /// Length of the window over one without weights. With Hann's weights it averages the frequency over less time: the average has the second moment
@@ -319,18 +320,10 @@ const BEHIND_SHAKER: Terms = Terms {
 /// short or contains no motion of about that frequency.
 pub(crate) fn harmonic(values: &[f64], sample_time: f64, omega: f64, terms: Terms) -> Option<Harmonic> {
     let middle = 0.5 * (values.len() - 1) as f64;
-    let count = values.len() as f64;
-    // Their squares are Hann's window, whose mean is a half.
-    let weights = terms
-        .is_hann
-        .then(|| DVector::from_fn(values.len(), |n, _| (PI * (n as f64 + 0.5) / count).sin()));
-    let mut right = DVector::from_column_slice(values);
-    let share = if let Some(weights) = &weights {
-        right.component_mul_assign(weights);
-        0.5
-    } else {
-        1.0
-    };
+    let values = DVector::from_column_slice(values);
+    // Their squares are Hann's window.
+    let hann = |n: usize| (PI * (n as f64 + 0.5) / values.len() as f64).sin();
+    let weights = DVector::from_fn(values.len(), |n, _| if terms.is_hann { hann(n) } else { 1.0 });
     // Half a window, s.
     let half = middle * sample_time;
     let (mut omega, mut last) = (omega, None);
@@ -339,14 +332,11 @@ pub(crate) fn harmonic(values: &[f64], sample_time: f64, omega: f64, terms: Term
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();
-        let mut basis = HarmonicBasis::new(&phases, terms.trend, terms.harmonics);
+        let basis = HarmonicBasis::weighted(&phases, terms.trend, terms.harmonics, weights.clone());
         if values.len() <= basis.terms() {
             return None;
         }
-        if let Some(weights) = &weights {
-            basis = basis.weighted(weights);
-        }
-        let fit = basis.fit(&right)?;
+        let fit = basis.fit(&values)?;
         let a = fit.harmonic(1);
         let square = a.norm_sqr();
         if square == 0.0 || !square.is_finite() {
@@ -359,18 +349,13 @@ pub(crate) fn harmonic(values: &[f64], sample_time: f64, omega: f64, terms: Term
     }
     let (basis, fit, a, growth) = last?;
     let amplitude = a.norm_sqr().sqrt();
-    let degrees = (values.len() - basis.terms()) as f64;
-    let noise = (basis.residual(&right, &fit).norm_squared() / (share * degrees)).sqrt();
-    let variances = |degree: usize| basis.variances(1, degree, weights.as_ref()).into_iter();
-    let largest = |degree: usize| variances(degree).fold(0.0, f64::max).sqrt();
+    let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max);
+    let u = |degree: usize| (fit.noise * largest(degree)).sqrt();
     Some(Harmonic {
         amplitude,
         omega,
         rate: growth / amplitude,
-        uncertainties: [
-            noise * largest(0),
-            noise * largest(1) / (amplitude * middle * sample_time),
-        ],
+        uncertainties: [u(0), u(1) / (amplitude * half)],
     })
 }
 

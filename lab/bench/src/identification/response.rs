@@ -7,12 +7,12 @@
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Display, Formatter};
-use std::ops::Mul;
 
 use nalgebra::{DVector, RowVector3};
 use num_complex::Complex64;
 use serde::Serialize;
-use vines_model::numerics::{Estimate, HarmonicBasis, complex_fit, golden_section, mean};
+use vines_estimate::{HarmonicBasis, transform};
+use vines_model::numerics::{Estimate, complex_fit, golden_section, mean};
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use super::{Cycle, most_harmonics};
@@ -150,12 +150,11 @@ impl Content {
         let Knowledge { sample_time, target, .. } = *knowledge;
         let n = values.len();
         let fit = basis.fit(values)?;
-        let rest = basis.residual(values, &fit);
         let amplitude = fit.harmonic(1).norm();
         if amplitude == 0.0 || !amplitude.is_finite() {
             return None;
         }
-        let rms = (rest.norm_squared() / (n - basis.terms()) as f64).sqrt() / amplitude;
+        let rms = fit.noise.sqrt() / amplitude;
         // Behind a filter a converter and a remainder of the motion are as white as before.
         let coloured = |k: usize| target.colour(k as f64 * omega, sample_time).max(1.0);
         let error = |k: usize| rms * (2.0 / n as f64 * coloured(k)).sqrt();
@@ -168,11 +167,11 @@ impl Content {
             errors: (2..=fit.harmonics()).map(error).collect(),
             harmonics,
             rest: rms,
-            noise: target.noise(rest.as_slice(), sample_time) / amplitude,
+            noise: target.noise(fit.rest.as_slice(), sample_time) / amplitude,
             tones: Vec::new(),
             samples_per_period: (TAU / (omega * sample_time)) as usize,
         };
-        Some((content, rest))
+        Some((content, fit.rest))
     }
 }
 
@@ -370,16 +369,6 @@ fn over_v(definition: Definition, square: f64) -> f64 {
         Sensor::V => 1.0,
         Sensor::Q1 => square * square.sqrt().powi(definition.sensor_quantity.order()),
     }
-}
-
-/// Sum of the values times `exp(-i turn n)`.
-fn transform<T: Copy + Mul<Complex64, Output = Complex64>>(values: &[T], turn: f64) -> Complex64 {
-    let (mut sum, mut rotor, step) = (Complex64::ZERO, Complex64::ONE, Complex64::cis(-turn));
-    for value in values {
-        sum += *value * rotor;
-        rotor *= step;
-    }
-    sum
 }
 
 // The regime, from the impacts that a simulated rig reports.
