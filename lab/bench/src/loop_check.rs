@@ -25,9 +25,9 @@ use vines_scene::linear::{LinearResponse, MeasuredLinear, POINT_RESOLUTION, Part
 use vines_scene::plan::Plan;
 use vines_scene::scene::{Unit, Units};
 
-/// Drives of the check, over the scene's drive: too small for impacts. The smaller one follows where the particle may have slid.
-const SHARES: [f64; 2] = [0.01, 0.01 / 16.0];
-/// Factor by which the drive is raised at a time: a fault that noise has hidden is seen at little more.
+/// Drive of the check, over the scene's drive: too small for impacts.
+const SHARE: f64 = 0.01;
+/// Factor by which the drive is raised at a time, and lowered twice where the particle may have slid: a fault that noise has hidden is seen at little more.
 const RAISE: f64 = 4.0;
 /// Largest relative difference of the frequency of a mode from the expected one: the range of a controller.
 const RANGE: f64 = 0.1;
@@ -61,7 +61,7 @@ pub struct LoopCheck {
 impl LoopCheck {
     /// Whether the drive was raised, because noise hid what is measured at a hundredth of it.
     pub fn is_raised(&self) -> bool {
-        self.share > SHARES[0]
+        self.share > SHARE
     }
 
     /// Whether noise hides a phase that is to be refused: the drive is too small.
@@ -88,13 +88,13 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
         None => expected(plan)[0].norm(),
     };
     let most = f64::min(1.0, 0.5 * plan.knowledge.numbers.b / (response * plan.amplitude));
-    let mut found = at_share(rig, plan, SHARES[0], MOST_WAITS)?;
+    let mut found = at_share(rig, plan, SHARE, MOST_WAITS)?;
     let is_refused = matches!(
         found.verdict,
         Verdict::ResponseLate | Verdict::BaseLate | Verdict::ResponseGain
     );
     if plan.knowledge.shaker.is_none() && is_refused {
-        let again = at_share(rig, plan, SHARES[1], MOST_WAITS.min(relaxed(plan)))?;
+        let again = at_share(rig, plan, SHARE / RAISE.powi(2), MOST_WAITS.min(relaxed(plan)))?;
         let periods = found.periods + again.periods;
         let is_healthy = again.verdict == Verdict::Healthy && !again.is_too_weak();
         found = if is_healthy { again } else { found };

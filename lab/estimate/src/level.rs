@@ -10,7 +10,8 @@
 //! `L' = g X/z + Lambda`, linear in all that is unknown: L at the start, Lambda0, Lambda1, its product with the lag, what disturbs the drive, and an amplitude
 //! for each other mode that rings with its known pole. The path of z is measured; its errors are a state of two real numbers, because X is the same
 //! on the true path: `g X/z` has another value there. A Kalman filter over periods whitens both against noise of response and drive, and least
-//! squares gives the unknowns with their covariance. A second pass runs along the path without the rings, with the slope of the first one.
+//! squares gives the unknowns with their covariance. Further passes run along the path without noise and rings that the one
+//! before found, with its slope.
 
 use nalgebra::{DMatrix, DVector, Matrix2};
 use num_complex::Complex64;

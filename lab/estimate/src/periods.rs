@@ -59,13 +59,18 @@ impl Fit {
     /// Variance of a component by white noise, from the median of the sixth differences: impulses are not noise.
     fn white(&self, signal: &[f64]) -> f64 {
         let sixth = |v: &[f64]| (20.0 * v[3] - 15.0 * (v[2] + v[4]) + 6.0 * (v[1] + v[5]) - (v[0] + v[6])).abs();
-        let mut sizes: Vec<f64> = signal[self.samples.clone()].windows(7).map(sixth).collect();
-        sizes.sort_by(f64::total_cmp);
-        let m = sizes.len();
-        let median = 0.5 * (sizes[(m - 1) / 2] + sizes[m / 2]);
+        let median = median(signal[self.samples.clone()].windows(7).map(sixth));
         // Median of the size of a normal variable; sum of the squares of the factors.
         (median / 0.6745).powi(2) / 924.0 * 2.0 / self.samples.len() as f64
     }
+}
+
+/// The median of some values, at least one.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    0.5 * (sorted[(n - 1) / 2] + sorted[n / 2])
 }
 
 fn mean(of: &[f64]) -> f64 {

@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use crate::interpolation::unwrapped;
+use crate::periods::median;
 use crate::record::Record;
 
 /// What a few periods say of the force. Forces are relative to the phase of the response.
@@ -52,10 +53,7 @@ pub fn windows(record: &Record, noise: f64) -> Vec<Window> {
         )
     };
     let forces: Vec<(Complex64, f64, f64)> = (0..record.steps.len()).map(force).collect();
-    let mut variances: Vec<f64> = forces.iter().map(|one| one.1).collect();
-    variances.sort_by(f64::total_cmp);
-    let m = variances.len();
-    let deviation = (0.5 * (variances[(m - 1) / 2] + variances[m / 2])).sqrt();
+    let deviation = median(forces.iter().map(|one| one.1)).sqrt();
     let length = (deviation / noise).ceil().clamp(LENGTHS[0], LENGTHS[1]) as usize;
     let of = |n: usize| {
         let span = n * length..(n + 1) * length;
@@ -74,7 +72,7 @@ pub fn windows(record: &Record, noise: f64) -> Vec<Window> {
             even_variance: 18.0 * mean(&|k| periods.noise[k + 1]) / count,
         }
     };
-    (0..m / length).map(of).collect()
+    (0..forces.len() / length).map(of).collect()
 }
 
 /// Probability that the regime changes from a window to the next one.

@@ -87,11 +87,10 @@ impl Cycle {
             Measurand::Displacement => HARMONICS,
             _ => all,
         };
-        let of_base = Bases::new(&uniform, in_base);
-        let of_response = (in_response != in_base).then(|| Bases::new(&uniform, in_response));
-        let Bases { basis, drifting, .. } = &of_base;
+        let bases = [in_response, in_base].map(|count| Bases::new(&uniform, count));
+        let Bases { basis, drifting, .. } = &bases[1];
         let fitted = |channel: usize, value: fn(&Sample) -> f64| {
-            let bases = of_response.as_ref().filter(|_| channel == 0).unwrap_or(&of_base);
+            let bases = &bases[channel];
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
             // Above many harmonics a sensor shows impacts rather than noise.
             let least = if bases.harmonics > HARMONICS { 0 } else { HARMONICS };
