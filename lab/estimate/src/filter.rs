@@ -161,7 +161,6 @@ impl Filter {
         let acts = |k: usize, row: usize| {
             let (both, before) = ([&columns.increments[k], &columns.direct[k]], k.saturating_sub(1));
             let fed_back = |path: Complex64| columns.feedback[k] * pair(path);
-            let of_unknown = |unit: Complex64| both.map(|of| pair(unit * of[row / 2]));
             match row {
                 0 => {
                     let [increment, direct] = both.map(|of| of[0]);
@@ -169,8 +168,10 @@ impl Filter {
                     [pair(increment) - fed_back, pair(direct - record.departure[k])]
                 }
                 1 => [-fed_back(linear[before]), -pair(linear[k])],
-                _ if row % 2 == 0 => of_unknown(Complex64::ONE),
-                _ => of_unknown(Complex64::i()),
+                _ => {
+                    let unit = [Complex64::ONE, Complex64::i()][row % 2];
+                    both.map(|of| pair(unit * of[row / 2]))
+                }
             }
         };
         let mut white = whiten(&self.periods, 2 + 2 * unknowns, acts);

@@ -61,13 +61,15 @@ pub struct HarmonicFit {
 }
 
 impl HarmonicBasis {
-    /// The basis at the `phases` (rad) of the fundamental: a polynomial of degree `trend`, and each of the harmonics 1, 2, …
-    /// of `harmonics` that is given with the degree of its amplitude; `None` leaves one out.
-    pub fn new(phases: &[f64], trend: i32, harmonics: &[Option<i32>]) -> Self {
-        Self::weighted(phases, trend, harmonics, DVector::from_element(phases.len(), 1.0))
+    /// The basis at the `phases` (rad) of the fundamental: a polynomial of degree `trend`, and as many harmonics, at least one, of which the first has an
+    /// amplitude of degree `drift`.
+    pub fn new(phases: &[f64], [trend, drift]: [i32; 2], harmonics: usize) -> Self {
+        let mut degrees = vec![Some(0); harmonics];
+        degrees[0] = Some(drift);
+        Self::weighted(phases, trend, &degrees, DVector::from_element(phases.len(), 1.0))
     }
 
-    /// Such a basis whose residuals count with these weights.
+    /// A basis with each of the harmonics 1, 2, … that is given with the degree of its amplitude; `None` leaves one out. Residuals count with these weights.
     pub fn weighted(phases: &[f64], trend: i32, harmonics: &[Option<i32>], weights: DVector<f64>) -> Self {
         let last = (phases.len().max(2) - 1) as f64;
         let time = |row: usize| 2.0 * row as f64 / last - 1.0;
@@ -165,7 +167,7 @@ mod tests {
             0.3 + (0.7 + 0.1 * t) * phase.sin() - 0.2 * phase.cos() + 0.05 * (3.0 * phase + 0.4).sin()
         });
         let values = DVector::from_iterator(150, values);
-        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(0)]);
+        let basis = HarmonicBasis::new(&phases, [0, 1], 3);
         let fit = basis.fit(&values).unwrap();
         assert!((fit.harmonic(1) - Complex64::new(0.7, -0.2)).norm() < 1e-14);
         assert!((fit.drift(1) - Complex64::new(0.1, 0.0)).norm() < 1e-14);
@@ -173,7 +175,7 @@ mod tests {
         assert!(fit.rest.norm() < 1e-13);
         // Too few or equal phases give no fit.
         for phases in [&[0.0, 0.1][..], &[0.0; 20]] {
-            let basis = HarmonicBasis::new(phases, 0, &[Some(0)]);
+            let basis = HarmonicBasis::new(phases, [0, 0], 1);
             assert!(basis.fit(&DVector::zeros(phases.len())).is_none());
         }
     }

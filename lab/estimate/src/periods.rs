@@ -47,7 +47,7 @@ impl Fit {
         let n = samples.len();
         let middle = 0.5 * (n - 1) as f64;
         let phases: Vec<f64> = (0..n).map(|k| (k as f64 - middle) * step).collect();
-        let basis = HarmonicBasis::new(&phases, 0, &vec![Some(0); HARMONICS.min(n / SAMPLES)]);
+        let basis = HarmonicBasis::new(&phases, [0, 0], HARMONICS.min(n / SAMPLES));
         Self { samples, basis }
     }
 

@@ -325,7 +325,7 @@ fn driven(record: &Record, scene: &Scene) -> Vec<Triple> {
             let phases: Vec<f64> = (0..window).map(|n| omega * dt * n as f64).collect();
             let values = part.iter().map(|sample| sample.sensors.response);
             let values = DVector::from_iterator(window, values);
-            let fit = HarmonicBasis::new(&phases, 0, &[Some(0)]).fit(&values)?;
+            let fit = HarmonicBasis::new(&phases, [0, 0], 1).fit(&values)?;
             let periods = d.omega0 * part[window / 2].time / TAU;
             Some([periods, fit.harmonic(1).norm() / d.b, d.sigma(omega)])
         })

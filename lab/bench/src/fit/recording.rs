@@ -257,7 +257,7 @@ impl Recording {
         let turn = omega0 * self.sample_time;
         let period = (TAU / turn).round() as usize;
         let phases: Vec<f64> = (0..period).map(|n| n as f64 * turn).collect();
-        let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
+        let basis = HarmonicBasis::new(&phases, [0, 0], 3);
         let unit = knowledge.target.displacement(channel, omega0);
         let fundamental = |(n, values): (usize, &[f64])| {
             let values = DVector::from_column_slice(values);

@@ -36,34 +36,6 @@ pub struct Cycle {
     pub samples: usize,
 }
 
-/// What is fitted to a channel over one period of the drive.
-struct Bases {
-    harmonics: usize,
-    /// Offset and harmonics.
-    basis: HarmonicBasis,
-    /// The first harmonic drifts as well: a change of the amplitude within the period is not noise.
-    drifting: HarmonicBasis,
-}
-
-impl Bases {
-    fn new(phases: &[f64], harmonics: usize) -> Self {
-        let mut degrees = vec![Some(0); harmonics];
-        let basis = HarmonicBasis::new(phases, 0, &degrees);
-        degrees[0] = Some(1);
-        let drifting = HarmonicBasis::new(phases, 0, &degrees);
-        Self { harmonics, basis, drifting }
-    }
-
-    /// The first two harmonics of a signal, and the variance of each component of the first by noise. `coloured`: spectrum of the noise at the
-    /// fundamental, over its mean.
-    fn harmonics(&self, values: &DVector<f64>, coloured: f64) -> Option<([Complex<f64>; 2], f64)> {
-        let fit = self.basis.fit(values)?;
-        let variance = self.drifting.fit(values)?.noise;
-        let harmonics = [1, 2].map(|n| fit.harmonic(n));
-        Some((harmonics, variance * coloured * 2.0 / values.len() as f64))
-    }
-}
-
 impl Cycle {
     /// The samples of one period; `phase` (rad): phase of the drive at the first. `None` for too few samples.
     pub fn of(samples: &[Sample], phase: f64, knowledge: &Knowledge) -> Option<Self> {
@@ -87,20 +59,21 @@ impl Cycle {
             Measurand::Displacement => HARMONICS,
             _ => all,
         };
-        let bases = [in_response, in_base].map(|count| Bases::new(&uniform, count));
-        let Bases { basis, drifting, .. } = &bases[1];
+        // The first harmonic drifts as well: a change of the amplitude within the period is not noise.
+        let with_drift = |count: usize| [0, 1].map(|drift| HarmonicBasis::new(&uniform, [0, drift], count));
+        let bases = [in_response, in_base].map(with_drift);
+        let [basis, drifting] = &bases[1];
         let fitted = |channel: usize, value: fn(&Sample) -> f64| {
-            let bases = &bases[channel];
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
+            let [fit, noise] = bases[channel].each_ref().map(|basis| basis.fit(&values));
+            let (fit, noise) = (fit?, noise?.noise);
             // Above many harmonics a sensor shows impacts rather than noise.
-            let least = if bases.harmonics > HARMONICS { 0 } else { HARMONICS };
+            let least = if fit.harmonics() > HARMONICS { 0 } else { HARMONICS };
             let coloured = target.colour_of_fundamental(mean_omega, sample_time, least);
-            let (harmonics, variance) = bases.harmonics(&values, coloured)?;
             let displacement = target.displacement(channel, mean_omega);
-            Some((
-                harmonics.map(|one| one * displacement),
-                variance * displacement.norm_sqr(),
-            ))
+            let harmonics = [1, 2].map(|n| fit.harmonic(n) * displacement);
+            let variance = noise * coloured * 2.0 / samples.len() as f64;
+            Some((harmonics, variance * displacement.norm_sqr()))
         };
         let ([response, second], noise) = fitted(0, |s| s.sensors.response)?;
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
@@ -113,23 +86,19 @@ impl Cycle {
             .harmonic(1);
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
-        let (base, base_second, base_noise) = if measured {
+        let (base, base_second, base_noise, phase_error) = if measured {
             let ([mut base, second], noise) = fitted(1, |s| s.sensors.reference.unwrap_or(0.0))?;
             match target.through_shaker {
                 true => commanded = base,
                 false => base = base * commanded / as_read,
             }
-            (base, second, noise)
+            let phase_error = (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg();
+            (base, second, noise, phase_error)
         } else {
             let base = mean(|s| s.command.drive.amplitude) * target.base_per_sample(mean_omega, sample_time);
-            (Complex::new(base, 0.0), Complex::ZERO, 0.0)
-        };
-        let phase_error = if measured {
-            (response * base.conj() * Complex::from_polar(1.0, -target.phase)).arg()
-        } else {
             let asked = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.command.drive.displacement));
             let asked = basis.fit(&asked).map(|fit| fit.harmonic(1));
-            match asked.filter(|asked| *asked != Complex::ZERO) {
+            let phase_error = match asked.filter(|asked| *asked != Complex::ZERO) {
                 // The drive of then. (The estimate of a controller is of some periods before.)
                 Some(asked) => {
                     let late = Complex::from_polar(1.0, mean_omega * target.delay - target.phase);
@@ -137,7 +106,8 @@ impl Cycle {
                 }
                 // A controller that tells no displacement compensates the delay.
                 None => mean(|s| s.command.phase_error.unwrap_or(0.0)),
-            }
+            };
+            (Complex::new(base, 0.0), Complex::ZERO, 0.0, phase_error)
         };
         Some(Self {
             commanded,

@@ -174,7 +174,7 @@ pub(crate) fn base_at_rest(record: &Record, knowledge: &Knowledge) -> Result<usi
     let period = (TAU / (omega * dt)).round() as usize;
     let step = ((period as f64 / PER_PERIOD).round() as usize).max(1);
     let phases: Vec<f64> = (0..period).map(|n| n as f64 * dt * omega).collect();
-    let basis = HarmonicBasis::new(&phases, 1, &[Some(0)]);
+    let basis = HarmonicBasis::new(&phases, [1, 0], 1);
     let displacement = target.displacement(1, omega).norm();
     let mut least: Option<Estimate> = None;
     for (n, values) in readings.windows(period).enumerate().step_by(step) {

@@ -37,9 +37,7 @@ const ASYMMETRIC: f64 = 0.5;
 /// for `n` samples `turn` rad of the motion apart.
 fn basis(n: usize, turn: f64) -> HarmonicBasis {
     let phases: Vec<f64> = (0..n).map(|n| n as f64 * turn).collect();
-    let mut degrees = vec![Some(0); most_harmonics(TAU / turn)];
-    degrees[0] = Some(2);
-    HarmonicBasis::new(&phases, 1, &degrees)
+    HarmonicBasis::new(&phases, [1, 2], most_harmonics(TAU / turn))
 }
 
 /// Harmonic content of what a channel reads, relative to its fundamental.
