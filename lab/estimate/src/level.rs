@@ -218,6 +218,11 @@ impl Level {
         Complex64::new(self.unknowns[FORCE], self.unknowns[FORCE + 1])
     }
 
+    /// The factors of the disturbances.
+    pub fn disturbances(&self) -> &[f64] {
+        &self.unknowns.as_slice()[self.unknowns.len() - self.disturbances..]
+    }
+
     /// Standard uncertainty of the sum of the components of Lambda with these weights, and of disturbances with these.
     pub fn uncertainty(&self, force: Complex64, disturbances: &[f64]) -> f64 {
         let mut weights = DVector::zeros(self.unknowns.len());

@@ -136,11 +136,12 @@ impl LevelEstimate {
 /// and the phase target is `target` beyond phase resonance, rad.
 fn resonance(level: &Level, response: Estimate, [gain, u_gain]: [f64; 2], [omega, target]: [f64; 2]) -> [Estimate; 3] {
     let (force, tangent) = (level.force(), target.tan());
+    // The first disturbance is that of g, which changes the force and what it is over alike.
+    let is_uncertain = usize::from(u_gain > 0.0);
+    let gain = gain * (1.0 + level.disturbances()[..is_uncertain].iter().sum::<f64>());
     let scale = -response.value / (gain * target.cos());
     let drive = scale * force.re;
-    // An error of g changes the force and what it is over alike.
-    let by_gain = [-drive];
-    let by_gain = &by_gain[..usize::from(u_gain > 0.0)];
+    let by_gain = &[-drive][..is_uncertain];
     [
         response,
         Estimate {

@@ -13,6 +13,7 @@ use vines_bench::experiment::ExperimentError;
 use vines_bench::identification::{
     DECAY_WINDOW, IdentificationError, Lock, Regime, ResonancePoint, decay_points, identify,
 };
+use vines_bench::linear::ParticleState;
 use vines_bench::loop_check::check;
 use vines_bench::record::Record;
 use vines_bench::rig::{
@@ -417,6 +418,31 @@ fn measurements_in_si_units_have_the_same_bits_whatever_the_scene_says_of_the_pa
 }
 
 // Locks of rigs at rest, random, difficult or with a real cavity.
+
+/// The check does not know whether friction carries the particle, whose mass is then a part of what a drive moves, or not.
+#[test]
+fn the_drives_of_levels_do_not_depend_on_whether_friction_carried_the_particle_in_the_check() {
+    let settings = |mu: &str| {
+        let rig =
+            "plant.M=1 plant.k=1 plant.c=0.0347 plant.m=0.024 plant.b=1 plant.r=0.488 start.dq2=0 excitation.G=1.1";
+        let levels = "backbone.points=9 backbone.C_from=0.6 backbone.C_to=0.2";
+        let all = format!("{rig} {levels} plant.mu_k={mu}");
+        paper(&all.split(' ').collect::<Vec<_>>())
+    };
+    let (client, rig) = (settings("0"), settings("0.00157"));
+    let mut simulated = Simulated::of(&rig).unwrap();
+    let linear = check(&mut *simulated, &client.plan()).unwrap().linear.unwrap().response;
+    assert_eq!(linear.particle, ParticleState::Unknown);
+    assert!((linear.omega0 * 1.024_f64.sqrt() - 1.0).abs() < 1e-5, "{linear:?}");
+    let plan = client.plan_on(client.knowledge().measured(linear));
+    let found = common::tracked(&mut *simulated, &plan, 20.0).unwrap();
+    let off = common::kept(&found).map(|point| {
+        let truth = common::resonant_motion(&rig.plant, rig.resonance, point.at.a_m, None).unwrap();
+        (point.at.drive().value / truth.amplitude - 1.0).abs()
+    });
+    let off: Vec<f64> = off.collect();
+    assert!(off.len() >= 7 && off.iter().all(|off| *off < 5e-4), "{off:?}");
+}
 
 #[test]
 fn friction_from_rest_is_never_called_a_motion_with_impacts() {
