@@ -61,8 +61,10 @@ impl Cycle {
         };
         // The first harmonic drifts as well: a change of the amplitude within the period is not noise.
         let with_drift = |count: usize| [0, 1].map(|drift| HarmonicBasis::new(&uniform, [0, drift], count));
-        let bases = [in_response, in_base].map(with_drift);
-        let [basis, drifting] = &bases[1];
+        let of_base = with_drift(in_base);
+        let of_response = (in_response != in_base).then(|| with_drift(in_response));
+        let bases = [of_response.as_ref().unwrap_or(&of_base), &of_base];
+        let [basis, drifting] = &of_base;
         let fitted = |channel: usize, value: fn(&Sample) -> f64| {
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
             let [fit, noise] = bases[channel].each_ref().map(|basis| basis.fit(&values));
