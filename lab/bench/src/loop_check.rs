@@ -64,6 +64,35 @@ impl LoopCheck {
         self.share > SHARE
     }
 
+    /// Whether the phase of the response is refused.
+    fn is_late(&self) -> bool {
+        matches!(self.verdict, Verdict::ResponseLate | Verdict::BaseLate)
+    }
+
+    /// Whether its phase or its gain is refused.
+    fn is_refused(&self) -> bool {
+        self.is_late() || self.verdict == Verdict::ResponseGain
+    }
+
+    /// Of this check and one at `more` drive the latter, which noise disturbs less, unless it is refused: a sensor is late or has a wrong factor at
+    /// every drive, but a particle that slides on the floor sticks to it at less.
+    fn or(self, more: Self) -> Self {
+        let periods = self.periods + more.periods;
+        let phase = |found: &Self| found.quantities.iter().find(|one| one.name == PHASES).copied();
+        let differs = phase(&self).zip(phase(&more)).is_some_and(|(less, more)| {
+            (less.measured - more.measured).abs() > SIGNIFICANT * less.uncertainty.hypot(more.uncertainty)
+        });
+        let is_certain = self.verdict == Verdict::Healthy && !self.is_too_weak();
+        let found = match more.is_refused() {
+            true if is_certain => self,
+            true if more.is_late() && (differs || self.verdict == Verdict::NotProportional) => {
+                Self { verdict: Verdict::NotProportional, ..more }
+            }
+            _ => more,
+        };
+        Self { periods, ..found }
+    }
+
     /// Whether noise hides a phase that is to be refused: the drive is too small.
     fn is_too_weak(&self) -> bool {
         // Noise does not look like exchanged channels, and more response would exceed the range of the base.
@@ -78,8 +107,7 @@ impl LoopCheck {
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
 /// a multiple of 2 pi before and after.
 ///
-/// A response that is refused is checked again at less drive: a sensor is late or has a wrong factor at every drive, but a particle that slides on
-/// the floor sticks to it. Where noise hides the phase, the drive is raised: to the scene's drive at most, or to a response of half the half-width,
+/// A response that is refused is checked again at less drive. Where noise hides the phase, the drive is raised: to the scene's drive at most, or to a response of half the half-width,
 /// which hits no particle in the inner half of the cavity.
 pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, RigError> {
     let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
@@ -89,20 +117,13 @@ pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, Ri
     };
     let most = f64::min(1.0, 0.5 * plan.knowledge.numbers.b / (response * plan.amplitude));
     let mut found = at_share(rig, plan, SHARE, MOST_WAITS)?;
-    let is_refused = matches!(
-        found.verdict,
-        Verdict::ResponseLate | Verdict::BaseLate | Verdict::ResponseGain
-    );
-    if plan.knowledge.shaker.is_none() && is_refused {
-        let again = at_share(rig, plan, SHARE / RAISE.powi(2), MOST_WAITS.min(relaxed(plan)))?;
-        let periods = found.periods + again.periods;
-        let is_healthy = again.verdict == Verdict::Healthy && !again.is_too_weak();
-        found = if is_healthy { again } else { found };
-        found.periods = periods;
+    if plan.knowledge.shaker.is_none() && found.is_refused() {
+        let less = at_share(rig, plan, SHARE / RAISE.powi(2), MOST_WAITS.min(relaxed(plan)))?;
+        found = less.or(found);
     }
     while found.is_too_weak() && found.share < most {
-        let raised = at_share(rig, plan, most.min(RAISE * found.share), MOST_WAITS)?;
-        found = LoopCheck { periods: found.periods + raised.periods, ..raised };
+        let share = most.min(RAISE * found.share);
+        found = found.or(at_share(rig, plan, share, MOST_WAITS)?);
     }
     let Units { response, reference, .. } = plan.knowledge.target.units;
     Ok(LoopCheck {
@@ -504,6 +525,9 @@ impl CheckedQuantity {
     }
 }
 
+/// Name of the phase of a response.
+const PHASES: &str = "phase of the response to the base, less the expected one";
+
 /// Natural frequency, damping, and the response over the expected response (`ratio`) of an oscillator that has both.
 fn of_response(linear: &LinearResponse, ratio: Complex64, plan: &Plan) -> [CheckedQuantity; 4] {
     let stated = plan.knowledge.linear;
@@ -513,14 +537,11 @@ fn of_response(linear: &LinearResponse, ratio: Complex64, plan: &Plan) -> [Check
     let phase = [ratio.arg().to_degrees(), linear.u_gain.to_degrees(), 0.0];
     let late = [Verdict::ResponseLate, Verdict::BaseLate][usize::from(ratio.arg() > 0.0)];
     let gain = [ratio.norm(), linear.u_gain, 1.0];
-    let (phases, gains) = (
-        "phase of the response to the base, less the expected one",
-        "response over base, over the expected one",
-    );
+    let gains = "response over base, over the expected one";
     [
         quantity("natural frequency", "Hz", hertz, NOTED[0] * hertz[2], None),
         quantity("damping rate", "1/s", damping, NOTED[1] * damping[2], None),
-        quantity(phases, "degrees", phase, PHASE, Some(late)),
+        quantity(PHASES, "degrees", phase, PHASE, Some(late)),
         quantity(gains, "", gain, FACTOR, Some(Verdict::ResponseGain)),
     ]
 }
@@ -643,6 +664,11 @@ pub enum Verdict {
     BaseGain,
     #[error("the response is late: check its filter and delay; a lock would hold another phase than it reports")]
     ResponseLate,
+    #[error(
+        "the response is late, but not at every drive, as with a particle that slides on its floor: hold the particle while the loop is checked, or \
+         reduce the noise"
+    )]
+    NotProportional,
     #[error("the base sensor is late: check its filter and delay; a lock would hold another phase than it reports")]
     BaseLate,
     #[error(

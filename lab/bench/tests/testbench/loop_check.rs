@@ -174,3 +174,21 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
         assert_eq!(kept(&measured), kept(&stated));
     }
 }
+
+#[test]
+fn a_particle_that_slides_at_the_drive_that_noise_asks_for_is_not_taken_for_a_late_sensor() {
+    // Without noise it sticks at the drive of the check.
+    for (mu, noise, verdict) in [
+        ("0.2", "chain.snr=90", Verdict::Healthy),
+        ("0.2", "chain.snr=40", Verdict::NotProportional),
+        ("0.3", "chain.snr=40", Verdict::NotProportional),
+    ] {
+        let found = check(
+            &mut *Simulated::of(&at_rest(&[noise, &format!("plant.mu_k={mu}")])).unwrap(),
+            &at_rest(&[noise]).plan(),
+        );
+        let found = found.unwrap();
+        assert_eq!(found.verdict, verdict, "{mu}, {noise}: {found:?}");
+        assert_eq!(found.linear.is_some(), verdict == Verdict::Healthy);
+    }
+}
