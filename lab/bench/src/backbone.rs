@@ -34,6 +34,9 @@ pub struct LevelPoint {
     pub settled: bool,
     /// The response reached the level; otherwise the drive was at a limit, or the time too short.
     pub reached: bool,
+    /// The key of the range whose end its readings reach, where a converter saturates.
+    #[serde(skip)]
+    pub saturated: Option<&'static str>,
     /// What in its periods is not noise.
     #[serde(skip)]
     pub unsteady: Option<Unsteady>,
@@ -59,6 +62,9 @@ pub struct LevelPoint {
 impl LevelPoint {
     /// Why the point has not settled, on a rig whose motions have mirror images or not; `None` if it has.
     pub fn unsettled(&self, is_symmetric: bool) -> Option<String> {
+        if let Some(range) = self.saturated {
+            return Some(format!("readings are at the end of {range}"));
+        }
         Some(match self.regime {
             _ if !self.reached => "the response does not reach the level".into(),
             _ if is_off_target(self.at.phase_error_deg.to_radians(), self.at.u_phase_deg.to_radians()) => {
@@ -218,6 +224,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, '_, R, C> {
             averaged: estimate.periods,
             settled: false,
             reached: is_reached(estimate.at[0], level),
+            saturated: knowledge.target.saturated(averaged.iter().map(|sample| sample.sensors)),
             unsteady: estimate.unsteady,
             regime: self.script.regime(&estimate, &cycles),
             regime_by_impacts: averaged[0]

@@ -62,6 +62,10 @@ pub enum IdentificationError {
         tolerance: f64,
     },
     #[error(
+        "readings of the hold are at the end of {range}, where the converter saturates: a larger range, or less drive"
+    )]
+    Saturated { range: &'static str },
+    #[error(
         "a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter"
     )]
     SensorAfterRelease { seconds: f64, what: &'static str },
@@ -110,6 +114,12 @@ pub struct Identification {
 /// No motion, a lock in another regime than the symmetric 1:1 one or off its phase, and a sensor that fails in the decay.
 pub fn identify(record: &Record, plan: &Plan) -> Result<Identification, IdentificationError> {
     let knowledge = plan.knowledge;
+    if let Some(range) = knowledge
+        .target
+        .saturated(record.hold().iter().map(|sample| sample.sensors))
+    {
+        return Err(IdentificationError::Saturated { range });
+    }
     let lock = measure(record, plan).ok_or(IdentificationError::NoMotion)?;
     let ResonancePoint { f_hz, a_m, sigma, c, .. } = lock.at;
     let response = Quantity { value: a_m, unit: knowledge.target.units.response.symbol };

@@ -36,6 +36,8 @@ pub struct Target {
     pub units: Units,
     /// The base is held from sample to sample: its fundamental is smaller than that of the samples.
     pub held: bool,
+    /// Magnitudes of scaled readings at the end of the range of their converters, as far as the scene states these; otherwise infinite.
+    pub ranges: [f64; 2],
 }
 
 impl Target {
@@ -82,6 +84,17 @@ impl Target {
             response: reading(0, sensors.response),
             reference: sensors.reference.map(|value| reading(1, value)),
         }
+    }
+
+    /// The key of the range that scaled readings exceed, if the scene states it: there a converter saturates.
+    pub fn saturated(&self, readings: impl IntoIterator<Item = Sensors>) -> Option<&'static str> {
+        readings
+            .into_iter()
+            .find_map(|Sensors { response, reference }| match self.ranges {
+                [most, _] if response.abs() >= most => Some("chain.response_range"),
+                [_, most] if reference.is_some_and(|value| value.abs() >= most) => Some("chain.base_range"),
+                _ => None,
+            })
     }
 
     /// A drive in metres of the oscillator, as the command of a rig.

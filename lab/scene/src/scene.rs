@@ -223,6 +223,7 @@ impl Scene {
                 delay: 0.0,
                 units: self.units(),
                 held: self.chain.hold,
+                ranges: self.ranges(),
             },
             shaker,
             nearest_pole: structure.map_or(f64::INFINITY, Structure::nearest_pole),

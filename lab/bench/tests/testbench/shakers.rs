@@ -673,3 +673,21 @@ fn what_is_wrong_with_a_shaker_is_said_in_one_sentence() {
         assert!(!message.contains('\n'), "{message}");
     }
 }
+
+#[test]
+fn where_harmonics_of_the_force_exceed_the_range_of_its_converter_there_is_neither_a_lock_nor_a_settled_level() {
+    let clipped = ["chain.adc_bits=16", "chain.base_range=1.11"];
+    let scene = super::preset("shaker-cantilever", &clipped).unwrap();
+    let record = record_of(&scene);
+    let error = identify(&record, &scene.plan()).unwrap_err();
+    assert!(error.to_string().contains("chain.base_range"), "{error}");
+    let levels = ["chain.adc_bits=16", "chain.base_range=1.15", "backbone.points=6"];
+    let scene = super::preset("shaker-cantilever", &levels).unwrap();
+    let tracked = tracked_of(&scene);
+    let mut points = tracked.points.iter();
+    assert!(
+        points.any(|point| !point.settled && point.saturated.is_some()),
+        "{:?}",
+        tracked.points
+    );
+}

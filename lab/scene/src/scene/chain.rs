@@ -78,6 +78,18 @@ impl Scene {
             None => ratio * levels[n] * d.omega0.powi(measurands[n].order()),
         })
     }
+
+    /// Magnitudes of readings of response and reference, as displacements in m of the oscillator, of the last step of their converters; infinite without
+    /// converters.
+    pub(crate) fn ranges(&self) -> [f64; 2] {
+        let (chain, d) = (&self.chain, self.dimensionless());
+        let ranges = [chain.response_range * d.b, d.amplitude(chain.base_range)];
+        ranges.map(|range| match chain.adc_bits {
+            // Two's complement has a step less on one side.
+            Some(bits) => range * (1.0 - 3.0 / 2_f64.powi(bits as i32)),
+            None => f64::INFINITY,
+        })
+    }
 }
 
 impl ChainSettings {
