@@ -4,9 +4,8 @@
 //! within 20 % of omega0. A lock is compared with the nearest place of the exact backbone. As in `vines fit`, this is where the differences in C,
 //! sigma and G, each over its standard uncertainty u, have the smallest sum of squares. Its root is the distance in u, scaled so that 95 % of such
 //! distances, with two degrees of freedom, are below 1.96. A lock is correct within 2e-3 in all three, uncertain within four u, and wrong beyond;
-//! other runs are refused, with a reason. Under a constant drive it is also wrong where the orbit there is unstable and grows by more than the result
-//! says it would show; `unseen` counts locks where it grows by less. `other_drive` counts locks whose measured drive is another than the requested
-//! one, by more than 1 % of it and three u: a response that has not come to rest. The result tells them.
+//! other runs are refused, with a reason. `other_drive` counts locks whose measured drive is another than the requested one, by more than 1 % of it and three
+//! u: a response that has not come to rest. The result tells them.
 //!
 //! Arguments: RIGS, SEED, SNR in dB or `none`. Writes validation/locks.csv.
 
@@ -36,30 +35,23 @@ fn lock(scene: &Scene) -> Result<Found, Failure> {
         let share = (-product(from, along) / product(along, along)).clamp(0.0, 1.0);
         let differences = [0, 1, 2].map(|i| from[i] + share * along[i]);
         let distance = (LIMITS[0] / LIMITS[1] * product(differences, differences)).sqrt();
-        (distance, differences, &pair[usize::from(share > 0.5)])
+        (distance, differences)
     });
     let nearest = places.min_by(|one, other| one.0.total_cmp(&other.0));
-    let (distance, differences, orbit) = nearest.ok_or("no exact backbone")?;
+    let (distance, differences) = nearest.ok_or("no exact backbone")?;
     let error = differences.into_iter().map(f64::abs).fold(0.0, f64::max);
-    // Control holds a response whether its motion is stable or not. A multiplier is that of half a period.
-    let unstable = !lock.held && !orbit.stable;
-    let growth = orbit.multipliers[3].powi(2) - 1.0;
-    let is_unseen = unstable && growth <= lock.unseen_growth;
     let mut counts = [0; 6];
     counts[match (error, distance) {
-        _ if unstable && !is_unseen => 2,
         (..=2e-3, _) => 0,
         (_, ..=4.0) => 1,
         _ => 2,
     }] = 1;
-    counts[4] = usize::from(is_unseen);
     let is_other = (at.g - d.g).abs() > f64::max(0.01 * d.g, 3.0 * at.u_g);
-    counts[5] = usize::from(is_other);
-    if counts[0] == 0 || unstable || is_other {
-        let (is, held) = (lock.regime, if lock.held { ", held" } else { "" });
+    counts[4] = usize::from(is_other);
+    if counts[0] == 0 || is_other {
         println!(
-            "{d:?}: C {:.5} G {:.5} ± {:.5}, {is}{held}: errors {differences:?}, {distance:.1} u; growth {growth:.2e}, unseen {:.2e}",
-            at.c, at.g, at.u_g, lock.unseen_growth
+            "{d:?}: C {:.5} G {:.5} ± {:.5}, {}: errors {differences:?}, {distance:.1} u",
+            at.c, at.g, at.u_g, lock.regime
         );
     }
     let periods = Some(record.settled as f64 / scene.controller.samples_per_period);
@@ -74,8 +66,8 @@ fn main() -> Result<(), Failure> {
         rig_with_stable_orbit(&mut uniform, &chain)
     };
     let found = survey(count, scene, lock)?;
-    let ([correct, uncertain, wrong, refused, unseen, other], text) = (counts(&found), statistics(&found));
-    let header = format!("rigs,seed,snr_dB,correct,uncertain,wrong,refused,unseen,other_drive,{STATISTICS}");
-    let row = format!("{count},{seed},{snr},{correct},{uncertain},{wrong},{refused},{unseen},{other},{text}");
+    let ([correct, uncertain, wrong, refused, other, _], text) = (counts(&found), statistics(&found));
+    let header = format!("rigs,seed,snr_dB,correct,uncertain,wrong,refused,other_drive,{STATISTICS}");
+    let row = format!("{count},{seed},{snr},{correct},{uncertain},{wrong},{refused},{other},{text}");
     write("locks", &header, 3, &[row])
 }
