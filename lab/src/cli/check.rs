@@ -126,7 +126,9 @@ pub(super) fn described(checked: &LoopCheck, scene: &Scene) -> String {
         });
         text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).text());
     }
-    for quantity in checked.quantities.iter().filter(|quantity| quantity.differs()) {
+    // What a refused check measures beside its fault is not used.
+    let is_told = |one: &&CheckedQuantity| one.differs() && (one.verdict.is_some() || checked.linear.is_some());
+    for quantity in checked.quantities.iter().filter(is_told) {
         let CheckedQuantity { name, unit, .. } = quantity;
         let (name, measured, expected) = (named(name, scene), measured(quantity), number(quantity.expected));
         let consequence = match quantity.verdict {
