@@ -245,28 +245,20 @@ fn main() -> Result<(), Failure> {
             Outcome::Refused,
         ]
         .map(of);
-        let mut errors: Vec<f64> = found
-            .iter()
-            .flat_map(|(_, errors, ..)| errors)
-            .copied()
-            .filter(|e| e.is_finite())
-            .collect();
-        let mut periods: Vec<f64> = found
-            .iter()
-            .map(|(_, _, periods, _)| *periods)
-            .filter(|p| p.is_finite())
-            .collect();
-        errors.sort_by(f64::total_cmp);
-        periods.sort_by(f64::total_cmp);
-        let middle = |all: &[f64]| all.get(all.len() / 2).copied().unwrap_or(f64::NAN);
-        let last = |all: &[f64]| all.last().copied().unwrap_or(f64::NAN);
+        let finite = |values: Vec<f64>| {
+            ends(
+                &values
+                    .into_iter()
+                    .filter(|value| value.is_finite())
+                    .collect::<Vec<f64>>(),
+            )
+        };
+        let errors = finite(found.iter().flat_map(|(_, errors, ..)| *errors).collect());
+        let periods = finite(found.iter().map(|(_, _, periods, _)| *periods).collect());
         let kinds = kinds.map(|count| count.to_string()).join(",");
         rows.push(format!(
             "{count},{seed},{kind},{kinds},{:.1e},{:.1e},{:.0},{:.0}",
-            middle(&errors),
-            last(&errors),
-            middle(&periods),
-            last(&periods)
+            errors[0], errors[1], periods[0], periods[1]
         ));
     }
     if rows.is_empty() {
