@@ -4,8 +4,8 @@
 //! within 20 % of omega0. A lock is compared with the nearest place of the exact backbone. As in `vines fit`, this is where the differences in C,
 //! sigma and G, each over its standard uncertainty u, have the smallest sum of squares. Its root is the distance in u, scaled so that 95 % of such
 //! distances, with two degrees of freedom, are below 1.96. A lock is correct within 2e-3 in all three, uncertain within four u, and wrong beyond;
-//! other runs are refused, with a reason. `other_drive` counts locks whose measured drive is another than the requested one, by more than 1 % of it and three
-//! u: a response that has not come to rest. The result tells them.
+//! other runs are refused, with a reason. `other_drive` counts locks whose measured drive is another than the requested one, by more than 1 % of it
+//! and three u: a response that has not come to rest. The result tells them.
 //!
 //! Arguments: RIGS, SEED, SNR in dB or `none`. Writes validation/locks.csv.
 

@@ -5,10 +5,10 @@
 //! force, the sensor at the drive or at the cavity, r 0.3 to 0.9, and G at most 4, the largest drive of a tracked backbone. Half of the drives
 //! are of a stable symmetric 1:1 orbit at phase resonance; at the others all orbits are unstable.
 //!
-//! Control holds the response. `stable` and `unstable` count locks with such an orbit, at a fixed frequency and drive, within 2e-3 of the measured drive
-//! and within 2e-3 in sigma and C, or within 3 u; `other_drive` those of which the result says that the drive is not the requested one. `wrong` are near no orbit. Orbits may be stable where no
-//! phase loop, which has integral action, can hold them: where, under a constant drive, the response lags less at a higher frequency. The words on a structure say
-//! where this is so, and their number counts refusals at such orbits alone.
+//! Control holds the response. `stable` and `unstable` count locks with such an orbit, at a fixed frequency and drive, within 2e-3 of the measured
+//! drive, and within 2e-3 in sigma and C, or within 3 u; `other_drive` those of which the result says that the drive is not the requested one. `wrong` are
+//! near no orbit. Orbits may be stable where no phase loop, which has integral action, can hold them: where, under a constant drive, the response lags less
+//! at a higher frequency. The words on a structure say where this is so, and their number counts refusals at such orbits alone.
 //!
 //! Arguments: STRUCTURES (of each kind), SEED. Writes validation/structures.csv. With `stable` or `unstable` it runs this kind alone; with numbers of
 //! structures behind it these alone: it then says what the loop did, and writes nothing.
@@ -245,13 +245,9 @@ fn main() -> Result<(), Failure> {
             Outcome::Refused,
         ]
         .map(of);
-        let finite = |values: Vec<f64>| {
-            ends(
-                &values
-                    .into_iter()
-                    .filter(|value| value.is_finite())
-                    .collect::<Vec<f64>>(),
-            )
+        let finite = |mut values: Vec<f64>| {
+            values.retain(|value| value.is_finite());
+            ends(&values)
         };
         let errors = finite(found.iter().flat_map(|(_, errors, ..)| *errors).collect());
         let periods = finite(found.iter().map(|(_, _, periods, _)| *periods).collect());

@@ -29,8 +29,8 @@ pub struct LevelPoint {
     pub periods: f64,
     /// Periods averaged.
     pub averaged: usize,
-    /// The motion was steady within these uncertainties, at its phase target and on the level, and neither irregular nor asymmetric; otherwise the point
-    /// was taken at the time limit.
+    /// The motion was steady within these uncertainties, at its phase target and on the level, neither irregular nor asymmetric, and its readings within
+    /// their ranges; otherwise [`LevelPoint::unsettled`] says why.
     pub settled: bool,
     /// The response reached the level; otherwise the drive was at a limit, or the time too short.
     pub reached: bool,

@@ -107,8 +107,8 @@ impl LoopCheck {
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
 /// a multiple of 2 pi before and after.
 ///
-/// A response that is refused is checked again at less drive. Where noise hides the phase, the drive is raised: to the scene's drive at most, or to a response of half the half-width,
-/// which hits no particle in the inner half of the cavity.
+/// A response that is refused is checked again at less drive. Where noise hides the phase, the drive is raised: to the scene's drive at most, or to a
+/// response of half the half-width, which hits no particle in the inner half of the cavity.
 pub fn check(rig: &mut (impl Rig + ?Sized), plan: &Plan) -> Result<LoopCheck, RigError> {
     let LinearResponse { omega0, damping_rate, .. } = plan.knowledge.linear;
     let response = match plan.knowledge.shaker {
@@ -662,7 +662,9 @@ pub enum Verdict {
         "the amplitude of the base is not that of the drive: check its unit and factor, and the gain of the shaker"
     )]
     BaseGain,
-    #[error("the response is late: check its filter and delay; a lock would hold another phase than it reports")]
+    #[error(
+        "the response is late: check its filter and delay, and whether the particle slides on its floor; a lock would hold another phase than it reports"
+    )]
     ResponseLate,
     #[error(
         "the response is late, but not at every drive, as with a particle that slides on its floor: hold the particle while the loop is checked, or \

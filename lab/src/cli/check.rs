@@ -27,7 +27,7 @@ The second table compares the measured values with the scene. Amplitudes 5 %, ph
 standard uncertainties: later measurements would be wrong by as much. A different natural frequency or damping is reported, not refused.
 Of an FMU, as rig or as controller, a table shows which variables the bench uses, in which units they are declared, and how it converts them.
 At the end: the gains that follow from controller.bandwidth, the only tuning parameter, with their phase margin.
-A response that is late at one drive and not at less is that of a particle that slides on its floor.
+A response that is late at one drive and not at less has its own name: a particle that slides on its floor does so.
 The exit code is 1 if anything is refused. `vines identify` and `vines backbone` check every rig that is not a simulation first, and use
 the natural frequency and the damping that the check has measured.
 
