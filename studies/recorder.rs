@@ -12,6 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use vines_bench::fit::Recording;
 use vines_identify::IdealRig;
 use vines_model::Measurand;
+use vines_model::theory::B_SYMMETRY_BREAKING;
 
 /// Samples of a period.
 const SAMPLES: f64 = 100.0;
@@ -63,6 +64,14 @@ pub fn schedule(kind: &str, rig: &IdealRig) -> Result<Vec<f64>, Failure> {
     let mut all: Vec<f64> = hold(high, 60).collect();
     match kind {
         "levels" => (0..7).for_each(|n| all.extend(ramp(level(n), level(n + 1), 12).chain(hold(level(n + 1), 45)))),
+        "asymmetric" => {
+            let loss = (ratio * B_SYMMETRY_BREAKING).hypot(1.0 - FRAC_PI_2 * B_SYMMETRY_BREAKING);
+            let at = |n: usize| loss * (1.1 - 0.04 * n as f64);
+            all = (0..10).fold(hold(at(0), 40).collect(), |mut all: Vec<f64>, n| {
+                all.extend(ramp(at(n), at(n + 1), 12).chain(hold(at(n + 1), 30)));
+                all
+            });
+        }
         "sweep" => all.extend(ramp(high, low, 500)),
         "decay" => all.extend(hold(high, 30).chain(hold(0.0, (3.0 / (TAU * rig.zeta)).min(250.0) as usize))),
         "mix" => {
@@ -78,7 +87,7 @@ pub fn schedule(kind: &str, rig: &IdealRig) -> Result<Vec<f64>, Failure> {
             );
             all.extend(hold(0.0, 60));
         }
-        other => return Err(format!("kinds: levels, sweep, decay, mix; not {other}").into()),
+        other => return Err(format!("kinds: levels, asymmetric, sweep, decay, mix; not {other}").into()),
     }
     Ok(all)
 }

@@ -73,9 +73,6 @@ const MAP_START: f64 = 1.02;
 /// Amplitude over that of the fold above which one lag describes the force. Between 3 and 7 % beyond the fold lies a bias of three standard
 /// uncertainties; the number is chosen, not derived.
 const BEYOND_FOLD: f64 = 1.0 / 0.93;
-/// Amplitude over that of the loss of symmetry below which the motion counts: at the loss itself the symmetric and the asymmetric motions are one, and
-/// a rig that is not quite symmetric leaves it before. The number is chosen, not derived.
-const BELOW_LOSS: f64 = 0.98;
 /// Rounds for a speed and the restitution that belongs to it: each leaves an eighth of the error or less.
 const ROUNDS: usize = 12;
 /// Fewest impacts of a stretch.
@@ -319,7 +316,7 @@ impl Element for Particle {
     }
 
     fn is_smooth(&self, amplitude: f64) -> bool {
-        (BEYOND_FOLD * self.fold()..BELOW_LOSS * self.symmetry_breaking()).contains(&amplitude)
+        (BEYOND_FOLD * self.fold()..self.symmetry_breaking()).contains(&amplitude)
     }
 
     fn along(&self, path: &Path) -> Option<Vec<Vec<(f64, Complex64)>>> {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use vines_estimate::{Record, Window, probabilities, windows};
 use vines_model::Sensor;
 
@@ -18,10 +19,10 @@ const NEVER: f64 = -1e4;
 const SECOND_ORDER: f64 = 0.3;
 
 /// Logarithms of the likelihoods of the motions in a window.
-pub type Likelihoods = [f64; 4];
+pub type Likelihoods = [f64; 5];
 
-/// Symmetric 1:1 impacts, the particle free, the particle carried, any other motion.
-pub const MOTIONS: [&str; 4] = ["1:1", "free", "carried", "other"];
+/// Symmetric 1:1 impacts, the particle free, the particle carried, any other motion; and asymmetric 1:1 impacts, which are another motion to a reader.
+pub const MOTIONS: [&str; 5] = ["1:1", "free", "carried", "other", "other"];
 
 /// What is expected of the forces.
 #[derive(Debug, Clone, Copy)]
@@ -51,17 +52,30 @@ impl Expected {
         let force = window.force - self.host * window.amplitude;
         let with = |mean: Complex64, variance: f64| normal(force - mean, window.variance + variance);
         let even = |variance: f64| normal(window.even, window.even_variance + variance);
-        let (symmetric, asymmetric) = (even(near / 4.0), even(far));
+        let (symmetric, any) = (even(near / 4.0), even(far));
+        let [lost, beyond] = Self::asymmetric(self.particle.symmetry_breaking() / window.amplitude);
+        let asymmetric = even(near / 4.0 + far * beyond) + lost.ln();
         let impacts = with(
             steady.force - steady.lag * slope * rate,
             near + (SECOND_ORDER * moved).powi(2),
         );
+        let of_impacts = |even: f64| if steady.exists { impacts + even } else { NEVER };
         [
-            if steady.exists { impacts + symmetric } else { NEVER },
+            of_impacts(symmetric + (1.0 - lost).ln()),
             with(Complex64::ZERO, near) + symmetric,
             with((self.particle.epsilon * window.amplitude).into(), near) + symmetric,
-            with(Complex64::ZERO, far) + asymmetric,
+            with(Complex64::ZERO, far) + any,
+            of_impacts(asymmetric),
         ]
+    }
+
+    /// Probability that 1:1 motion has lost its symmetry, which happens at `loss` times the amplitude, as uncertain as a half-width in a drawing; and by how
+    /// much the amplitude is beyond it then, relative, on average. The asymmetry grows with the root of this, as at every pitchfork.
+    fn asymmetric(loss: f64) -> [f64; 2] {
+        let (u, below) = (IdealRig::UNCERTAINTY[3], loss.ln());
+        let normal = Normal::standard();
+        let probability = normal.sf(below / u).max(f64::MIN_POSITIVE);
+        [probability, u * normal.pdf(below / u) / probability - below]
     }
 }
 
@@ -176,7 +190,7 @@ pub fn one_to_one(record: &Record, expected: &Expected) -> (Vec<bool>, Vec<(Wind
     for (window, probability) in windows.into_iter().zip(&probabilities) {
         let [from, to] = window.periods;
         used[from..to].fill(probability[0] > 0.5);
-        let most = (0..4)
+        let most = (0..MOTIONS.len())
             .max_by(|i, j| probability[*i].total_cmp(&probability[*j]))
             .unwrap_or(3);
         motions.push((window, most));

@@ -172,7 +172,8 @@ fn the_rough_scene_is_that_of_the_prototype() {
         .into_iter()
         .zip(prototype.rough)
     {
-        same([value], &[expected], 1e-6);
+        // The prototype knows no asymmetric impacts.
+        same([value], &[expected], 1e-4);
     }
 }
 
