@@ -18,7 +18,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 use vines_estimate::{Backbone, Basis, CubicSpline, Curve, Element, Linear};
 use vines_model::Definition;
-use vines_model::numerics::{Estimate, LeastSquares, Misfit, SIGNIFICANT, equally_spaced, mean, range};
+use vines_model::numerics::{
+    Estimate, LeastSquares, Misfit, SIGNIFICANT, equally_spaced, mean, range, singular_values,
+};
 use vines_model::theory::{B_SYMMETRY_BREAKING, BranchSide, SlowFlow};
 
 use crate::branch::Branch;
@@ -501,7 +503,7 @@ impl Data {
             let itself = problem.itself(&fit.x, &at);
             let powers = DMatrix::from_fn(itself.len(), 4, |n, power| itself[n][0].ln().powi(power as i32));
             let ratios = DVector::from_fn(itself.len(), |n, _| itself[n][2] / linear.omega0);
-            let frequency = powers.svd(true, true).solve(&ratios, f64::EPSILON).ok()?;
+            let frequency = singular_values(powers)?.solve(&ratios, f64::EPSILON).ok()?;
             let frequency = std::array::from_fn(|power| frequency[power]);
             let read = Particle { frequency, ..problem.particle(&fit.x) };
             let curves = self.curves.iter().map(|one| {

@@ -4,7 +4,8 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, RowSVector, SMatrix, SVector, linalg::Schur};
+use nalgebra::linalg::{SVD, Schur};
+use nalgebra::{Complex, Const, DMatrix, DVector, DimMin, Dyn, RowSVector, SMatrix, SVector};
 
 /// Standard errors from which on a difference is not noise: 0.3 % of normal noise is beyond.
 pub const SIGNIFICANT: f64 = 3.0;
@@ -99,7 +100,7 @@ where
     None
 }
 
-/// The smallest solution of `matrix x = right`; `None` if the matrix contains what is no number, in which singular values are searched for ever.
+/// The smallest solution of `matrix x = right`; `None` if the matrix contains what is no number, or has no singular values.
 fn solve<const N: usize>(matrix: SMatrix<f64, N, N>, right: &SVector<f64, N>) -> Option<SVector<f64, N>>
 where
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
@@ -114,9 +115,19 @@ where
         return lu.solve(right);
     }
     let right = DVector::from_column_slice(right.as_slice());
-    let factors = DMatrix::from_column_slice(N, N, matrix.as_slice()).svd(true, true);
+    let factors = singular_values(DMatrix::from_column_slice(N, N, matrix.as_slice()))?;
     let least = factors.solve(&right, SINGULAR * factors.singular_values.max()).ok()?;
     Some(SVector::from_column_slice(least.as_slice()))
+}
+
+/// Singular values, in no order, and their vectors; `None` where they are no numbers: of a matrix that contains such, or whose values differ by more than
+/// numbers reach.
+pub fn singular_values(matrix: DMatrix<f64>) -> Option<SVD<f64, Dyn, Dyn>> {
+    let steps = MOST_STEPS * matrix.nrows();
+    // Of what is no number they are searched for ever.
+    let is_finite = matrix.iter().all(|one| one.is_finite());
+    let found = is_finite.then(|| SVD::try_new_unordered(matrix, true, true, f64::EPSILON, steps))??;
+    found.singular_values.iter().all(|one| one.is_finite()).then_some(found)
 }
 
 /// Eigenvalues of a square matrix; NaN if it contains one, or where the QR algorithm does not converge: some matrices it turns for ever.
@@ -504,6 +515,18 @@ mod tests {
         one[(2, 1)] = f64::INFINITY;
         assert!(eigenvalues(one).iter().all(|one| one.re.is_nan()));
         let matrix = SMatrix::<f64, 4, 4>::from_element(f64::NAN);
+        assert_eq!(solve(matrix, &SVector::from_element(1.0)), None);
+        // Its singular values differ by more than the numbers reach: one of them becomes NaN.
+        let (far, near) = (4.397322051532504e85, 1.396306947894183e-119);
+        let matrix = SMatrix::<f64, 4, 4>::from_row_slice(
+            &[
+                [-far, -far, 3.9327393867238056e-45, 0.0],
+                [0.0, 0.0, 0.0, 6.77073453386716e-61],
+                [0.0; 4],
+                [near, near, 0.0, -4.922498105141392e99],
+            ]
+            .concat(),
+        );
         assert_eq!(solve(matrix, &SVector::from_element(1.0)), None);
     }
 

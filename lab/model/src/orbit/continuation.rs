@@ -7,14 +7,14 @@
 //! Each kind of bifurcation has a test function of the multipliers that is zero there, and smooth also where multipliers meet. A change of
 //! its sign shows a bifurcation; two of a kind within one step are missed.
 
-use nalgebra::{Matrix4, Matrix6};
+use nalgebra::{DMatrix, Matrix4, Matrix6};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 use super::impacts::{Bounce, ImpactPattern, ImpactSection};
 use super::periodic::{Periodic, SAME_MOTION, wrapped};
 use super::return_map::{Bifurcation, Condition, Stability, Unknowns};
 use crate::Dimensionless;
-use crate::numerics::{CONVERGED, try_bisection};
+use crate::numerics::{CONVERGED, singular_values, try_bisection};
 
 /// Ranges, number of points and step of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -406,7 +406,8 @@ pub(super) fn branch_off(
 ) -> Option<Branch> {
     let from = &at.motion;
     // The eigenvector of the map for the multiplier -1.
-    let svd = (from.map.monodromy() + Matrix4::identity()).svd(false, true);
+    let turned = from.map.monodromy() + Matrix4::identity();
+    let svd = singular_values(DMatrix::from_column_slice(4, 4, turned.as_slice()))?;
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
