@@ -75,7 +75,8 @@ impl Expected {
         let (u, below) = (IdealRig::UNCERTAINTY[3], loss.ln());
         let normal = Normal::standard();
         let probability = normal.sf(below / u).max(f64::MIN_POSITIVE);
-        [probability, u * normal.pdf(below / u) / probability - below]
+        // Far below the loss both tails are rounding.
+        [probability, (u * normal.pdf(below / u) / probability - below).max(0.0)]
     }
 }
 
@@ -203,4 +204,35 @@ pub fn one_to_one(record: &Record, expected: &Expected) -> (Vec<bool>, Vec<(Wind
         used[begin..end].fill(false);
     }
     (used, motions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_of_any_amplitude_has_likelihoods() {
+        for r in [0.1, 0.65, 0.95, 0.99] {
+            let particle = Particle::ideal([0.01, 0.01, r], Sensor::Q1);
+            let expected = Expected {
+                particle,
+                host: Complex64::ZERO,
+                tolerance: TOLERANCES[1],
+                scale: 1e-4,
+            };
+            for amplitude in [0.0, 1e-5, 1.01 * particle.fold(), 1e-3, 7e-3, 8e-3, 0.1] {
+                let window = Window {
+                    periods: [1, 4],
+                    force: Complex64::ZERO,
+                    variance: 1e-14,
+                    amplitude,
+                    rate: 0.0,
+                    even: Complex64::new(1e-5, 0.0),
+                    even_variance: 1e-14,
+                };
+                let found = expected.likelihoods(&window);
+                assert!(!found.iter().any(|one| one.is_nan()), "{r}, {amplitude}: {found:?}");
+            }
+        }
+    }
 }
