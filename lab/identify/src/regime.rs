@@ -35,6 +35,8 @@ pub struct Expected {
     pub tolerance: f64,
     /// Scale of the forces, m.
     pub scale: f64,
+    /// Standard uncertainty of the amplitude at which the motion loses its symmetry, relative: that of the half-width.
+    pub loss: f64,
 }
 
 impl Expected {
@@ -53,7 +55,7 @@ impl Expected {
         let with = |mean: Complex64, variance: f64| normal(force - mean, window.variance + variance);
         let even = |variance: f64| normal(window.even, window.even_variance + variance);
         let (symmetric, any) = (even(near / 4.0), even(far));
-        let [lost, beyond] = Self::asymmetric(self.particle.symmetry_breaking() / window.amplitude);
+        let [lost, beyond] = self.asymmetric(window.amplitude);
         let asymmetric = even(near / 4.0 + far * beyond) + lost.ln();
         let impacts = with(
             steady.force - steady.lag * slope * rate,
@@ -69,10 +71,10 @@ impl Expected {
         ]
     }
 
-    /// Probability that 1:1 motion has lost its symmetry, which happens at `loss` times the amplitude, as uncertain as a half-width in a drawing; and by how
-    /// much the amplitude is beyond it then, relative, on average. The asymmetry grows with the root of this, as at every pitchfork.
-    fn asymmetric(loss: f64) -> [f64; 2] {
-        let (u, below) = (IdealRig::UNCERTAINTY[3], loss.ln());
+    /// Probability that 1:1 motion of an amplitude, m, has lost its symmetry, and by how much the amplitude is beyond the loss then, relative, on average.
+    /// The asymmetry grows with the root of this, as at every pitchfork.
+    fn asymmetric(&self, amplitude: f64) -> [f64; 2] {
+        let (u, below) = (self.loss, (self.particle.symmetry_breaking() / amplitude).ln());
         let normal = Normal::standard();
         let probability = normal.sf(below / u).max(f64::MIN_POSITIVE);
         // Far below the loss both tails are rounding.
@@ -162,6 +164,8 @@ fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2], sensor: Senso
             host: Complex64::new(found[1], found[2]),
             tolerance: TOLERANCES[0],
             scale,
+            // The half-widths that are tried are so far apart.
+            loss: 2.0 * u[3] / f64::from(GRID),
         };
         let all: Vec<Likelihoods> = windows.iter().map(|window| expected.likelihoods(window)).collect();
         let change = found - Vector3::new(scene.epsilon, 0.0, 0.0);
@@ -178,6 +182,8 @@ fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2], sensor: Senso
 pub const TOLERANCES: [f64; 2] = [0.1, 0.05];
 /// What is left of a deviation of the particle, which falls by r in half a period, after half of the periods in which it settles: 1e-3 at their end.
 const TRANSIENT: f64 = 0.03;
+/// Probability of symmetric 1:1 motion from which on a window counts: one that does not costs a little information, and one of another motion a bias.
+const COUNTS: f64 = 0.95;
 /// Periods that a window may be late.
 const LATE: usize = 3;
 
@@ -190,7 +196,7 @@ pub fn one_to_one(record: &Record, expected: &Expected) -> (Vec<bool>, Vec<(Wind
     let mut motions = Vec::new();
     for (window, probability) in windows.into_iter().zip(&probabilities) {
         let [from, to] = window.periods;
-        used[from..to].fill(probability[0] > 0.5);
+        used[from..to].fill(probability[0] > COUNTS);
         let most = (0..MOTIONS.len())
             .max_by(|i, j| probability[*i].total_cmp(&probability[*j]))
             .unwrap_or(3);
@@ -219,6 +225,7 @@ mod tests {
                 host: Complex64::ZERO,
                 tolerance: TOLERANCES[1],
                 scale: 1e-4,
+                loss: IdealRig::UNCERTAINTY[3],
             };
             for amplitude in [0.0, 1e-5, 1.01 * particle.fold(), 1e-3, 7e-3, 8e-3, 0.1] {
                 let window = Window {
