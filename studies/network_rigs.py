@@ -181,7 +181,7 @@ def main() -> None:
     print("\n".join(failed))
     errors = np.array([error for _, one, _ in found for error in one])
     points, settled = np.array([counts for *_, counts in found]).sum(axis=0)
-    shares = f"{np.mean(errors <= 1.96):.3f},{np.mean(errors <= 3):.4f},{errors.max():.1f}"
+    shares = f"{np.mean(errors <= 1.96):.3f},{np.mean(errors <= 3):.4f},{max(errors, default=math.nan):.1f}"
     row = f"{rigs},{seed},{snr:g},{len(failed)},{points},{settled},{shares}"
     header = "rigs,seed,snr_dB,failed,points,settled,within_1.96u,within_3u,worst_u"
     rows = TABLE.read_text().splitlines()[1:] if TABLE.exists() else []

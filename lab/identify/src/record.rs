@@ -196,8 +196,8 @@ fn passes(samples: &Samples, rough: &IdealRig, found: &mut BTreeSet<usize>) -> O
         let particle = effective(near, &scene.backbone(samples.sensor)?, scene.linear())?;
         let scale = scene.epsilon * scene.b;
         let tolerance = TOLERANCES[usize::from(pass > 1)];
-        let loss = IdealRig::UNCERTAINTY[3];
-        let expected = Expected { particle, host: Complex64::ZERO, tolerance, scale, loss };
+        let u_loss = IdealRig::UNCERTAINTY[3];
+        let expected = Expected { particle, host: Complex64::ZERO, tolerance, scale, u_loss };
         let (used, motions) = one_to_one(&record, &expected);
         *found = motions.iter().map(|(_, motion)| *motion).collect();
         if used.iter().filter(|one| **one).count() < FEWEST_PERIODS {

@@ -18,11 +18,11 @@ const NEVER: f64 = -1e4;
 /// Error of the growth's first order, over its size.
 const SECOND_ORDER: f64 = 0.3;
 
-/// Logarithms of the likelihoods of the motions in a window.
+/// Logarithms of the likelihoods of the motions in a window: [`MOTIONS`], and asymmetric 1:1 impacts.
 pub type Likelihoods = [f64; 5];
 
-/// Symmetric 1:1 impacts, the particle free, the particle carried, any other motion; and asymmetric 1:1 impacts, which are another motion to a reader.
-pub const MOTIONS: [&str; 5] = ["1:1", "free", "carried", "other", "other"];
+/// Symmetric 1:1 impacts, the particle free, the particle carried, any other motion, among them asymmetric 1:1 impacts.
+pub const MOTIONS: [&str; 4] = ["1:1", "free", "carried", "other"];
 
 /// What is expected of the forces.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,7 @@ pub struct Expected {
     /// Scale of the forces, m.
     pub scale: f64,
     /// Standard uncertainty of the amplitude at which the motion loses its symmetry, relative: that of the half-width.
-    pub loss: f64,
+    pub u_loss: f64,
 }
 
 impl Expected {
@@ -74,7 +74,7 @@ impl Expected {
     /// Probability that 1:1 motion of an amplitude, m, has lost its symmetry, and by how much the amplitude is beyond the loss then, relative, on average.
     /// The asymmetry grows with the root of this, as at every pitchfork.
     fn asymmetric(&self, amplitude: f64) -> [f64; 2] {
-        let (u, below) = (self.loss, (self.particle.symmetry_breaking() / amplitude).ln());
+        let (u, below) = (self.u_loss, (self.particle.symmetry_breaking() / amplitude).ln());
         let normal = Normal::standard();
         let probability = normal.sf(below / u).max(f64::MIN_POSITIVE);
         // Far below the loss both tails are rounding.
@@ -165,7 +165,7 @@ fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2], sensor: Senso
             tolerance: TOLERANCES[0],
             scale,
             // The half-widths that are tried are so far apart.
-            loss: 2.0 * u[3] / f64::from(GRID),
+            u_loss: 2.0 * u[3] / f64::from(GRID),
         };
         let all: Vec<Likelihoods> = windows.iter().map(|window| expected.likelihoods(window)).collect();
         let change = found - Vector3::new(scene.epsilon, 0.0, 0.0);
@@ -182,7 +182,8 @@ fn mixture(windows: &[Window], scene: &IdealRig, [r, b]: [f64; 2], sensor: Senso
 pub const TOLERANCES: [f64; 2] = [0.1, 0.05];
 /// What is left of a deviation of the particle, which falls by r in half a period, after half of the periods in which it settles: 1e-3 at their end.
 const TRANSIENT: f64 = 0.03;
-/// Probability of symmetric 1:1 motion from which on a window counts: one that does not costs a little information, and one of another motion a bias.
+/// Probability of symmetric 1:1 motion above which a window counts: to leave out one of these costs a little information, to count one of another motion
+/// makes a bias.
 const COUNTS: f64 = 0.95;
 /// Periods that a window may be late.
 const LATE: usize = 3;
@@ -197,10 +198,9 @@ pub fn one_to_one(record: &Record, expected: &Expected) -> (Vec<bool>, Vec<(Wind
     for (window, probability) in windows.into_iter().zip(&probabilities) {
         let [from, to] = window.periods;
         used[from..to].fill(probability[0] > COUNTS);
-        let most = (0..MOTIONS.len())
-            .max_by(|i, j| probability[*i].total_cmp(&probability[*j]))
-            .unwrap_or(3);
-        motions.push((window, most));
+        let other = MOTIONS.len() - 1;
+        let most = (0..probability.len()).max_by(|i, j| probability[*i].total_cmp(&probability[*j]));
+        motions.push((window, most.map_or(other, |most| most.min(other))));
     }
     // A deviation of the particle falls by r in half a period.
     let settling = (TRANSIENT.ln() / expected.particle.r.ln()) as usize + LATE;
@@ -225,7 +225,7 @@ mod tests {
                 host: Complex64::ZERO,
                 tolerance: TOLERANCES[1],
                 scale: 1e-4,
-                loss: IdealRig::UNCERTAINTY[3],
+                u_loss: IdealRig::UNCERTAINTY[3],
             };
             for amplitude in [0.0, 1e-5, 1.01 * particle.fold(), 1e-3, 7e-3, 8e-3, 0.1] {
                 let window = Window {

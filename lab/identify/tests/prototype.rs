@@ -172,8 +172,7 @@ fn the_rough_scene_is_that_of_the_prototype() {
         .into_iter()
         .zip(prototype.rough)
     {
-        // The prototype knows no asymmetric impacts.
-        same([value], &[expected], 1e-4);
+        same([value], &[expected], 1e-6);
     }
 }
 
