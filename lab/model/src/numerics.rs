@@ -100,7 +100,7 @@ where
     None
 }
 
-/// The smallest solution of `matrix x = right`; `None` if the matrix contains what is no number, or has no singular values.
+/// The smallest solution of `matrix x = right`; `None` without [`singular_values`].
 fn solve<const N: usize>(matrix: SMatrix<f64, N, N>, right: &SVector<f64, N>) -> Option<SVector<f64, N>>
 where
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
@@ -120,11 +120,10 @@ where
     Some(SVector::from_column_slice(least.as_slice()))
 }
 
-/// Singular values, in no order, and their vectors; `None` where they are no numbers: of a matrix that contains such, or whose values differ by more than
-/// numbers reach.
+/// Singular values, in no order, and their vectors; `None` if the matrix contains NaN or infinity, or if rounding turns a singular value into one.
 pub fn singular_values(matrix: DMatrix<f64>) -> Option<SVD<f64, Dyn, Dyn>> {
     let steps = MOST_STEPS * matrix.nrows();
-    // Of what is no number they are searched for ever.
+    // With NaN or infinity the iteration does not converge.
     let is_finite = matrix.iter().all(|one| one.is_finite());
     let found = is_finite.then(|| SVD::try_new_unordered(matrix, true, true, f64::EPSILON, steps))??;
     found.singular_values.iter().all(|one| one.is_finite()).then_some(found)
@@ -516,7 +515,7 @@ mod tests {
         assert!(eigenvalues(one).iter().all(|one| one.re.is_nan()));
         let matrix = SMatrix::<f64, 4, 4>::from_element(f64::NAN);
         assert_eq!(solve(matrix, &SVector::from_element(1.0)), None);
-        // Its singular values differ by more than the numbers reach: one of them becomes NaN.
+        // Its elements are 200 orders of magnitude apart: nalgebra finds NaN for a singular value.
         let (far, near) = (4.397322051532504e85, 1.396306947894183e-119);
         let matrix = SMatrix::<f64, 4, 4>::from_row_slice(
             &[
